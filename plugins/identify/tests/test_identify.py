@@ -15,11 +15,11 @@ from graspsense_identify.fit import fit
 from graspsense_identify.forward import RIGID_PADS, ForwardModel
 from graspsense_identify.fracture import explained_falls, fracture_of
 from graspsense_identify.laws import memories, scale_of, static_candidates
+from graspsense_identify.parts import parts_of
 from graspsense_identify.prepare import _smooth_course, prepared
 from graspsense_identify.refuse import shows_memory
-from graspsense_identify.run import _looks_wrong, _own_settings, _ready, _used
+from graspsense_identify.run import _looks_wrong, _own_settings, _ready, _used, identify
 from graspsense_identify.share import Shares
-from graspsense_identify.spread import refits
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.pads import PadCompliance
 from graspsense_sim_gripper.scene.spec import parse_scene
@@ -42,14 +42,6 @@ def test_a_force_of_the_pads_is_taken_at_the_time_of_its_image():
     closure = np.maximum(WIDTH_M - squeeze.gap_m[squeeze.sample][loading], 0.0)
     # Taken at the ticks that repeat it, it would lag by 20 ms on average, which is 0.4 N here.
     assert np.abs(squeeze.force_n[loading] - 1000.0 * closure).max() < 0.1
-
-
-def test_a_force_that_is_a_mean_is_compared_with_the_mean_of_the_law():
-    t_s, sample = np.linspace(0.0, 1.0, 41), np.arange(0, 41, 4)
-    squeeze = evolve(ready(), t_s=t_s, sample=sample, averaged_s2=np.full(len(sample), 0.01**2))
-    # The mean of 3 t^2 over times of variance v is 3 t^2 + 3 v.
-    mean = squeeze.at_samples(3.0 * t_s**2)
-    assert mean[1:-1] == pytest.approx(3.0 * t_s[sample[1:-1]] ** 2 + 3.0 * 0.01**2)
 
 
 def test_the_mean_over_ticks_does_not_flatten_a_course_of_the_gap():
@@ -120,17 +112,58 @@ def test_the_noise_of_pads_that_touch_nothing_is_no_squeeze(seed):
         prepared(noisy, 0.0)
 
 
-@pytest.mark.parametrize(("share", "noted"), [(0.95, False), (0.5, True)])
-def test_pads_that_feel_different_forces_are_noted(share, noted):
-    squeeze = recorded()
-    left = squeeze.trace.force_left_n
-    apart = evolve(squeeze, trace=evolve(squeeze.trace, force_left_n=left, force_right_n=share * left))
-    notes = []
+def with_right_pad(share, noise_n=0.0):
+    """Return a squeeze whose right pad measures a share of the force of the left one."""
+    noise = noise_n * np.random.default_rng(0).standard_normal((2, len(recorded().trace.t_s)))
+    left = recorded().trace.force_left_n
+    pads = {"force_left_n": left + noise[0], "force_right_n": share * left + noise[1]}
+    return evolve(recorded(), trace=evolve(recorded().trace, **pads))
 
-    _ready(SimConfig(), [squeeze, apart], notes, has_cells=False)
 
-    assert [note for note in notes if "pads differ" in note] == notes
-    assert bool(notes) == noted
+def test_recordings_whose_pads_differ_are_left_out_and_a_scene_of_only_such_ones_is_refused():
+    config, notes = SimConfig(sensor="ideal", pad_stiffness_n_m=float("inf")), []
+    alike, apart = recorded(), with_right_pad(0.5)
+    assert len(_ready(config, [alike, with_right_pad(0.95)], notes, has_cells=False)[0]) == 2
+    assert notes == []
+    assert len(_ready(config, [alike, apart], notes, has_cells=False)[0]) == 1
+    assert len(notes) == 1
+
+    def what_is_not_determined(squeeze):
+        result = identify(config, [squeeze], lambda *_: None)
+        return {open_.what for open_ in result.undetermined if open_.in_scene}
+
+    assert (
+        what_is_not_determined(apart)
+        == what_is_not_determined(with_right_pad(0.0))
+        == {"the force on the object"}
+    )
+    # Noise of a tenth of the peak makes single measurements differ by a third of it.
+    assert what_is_not_determined(with_right_pad(1.0, noise_n=0.8)) == set()
+
+
+@every_case(
+    ("stiffnesses", "scale", "told"),
+    [
+        ((1000.0, 1100.0, 900.0), 1.0, False),
+        ((1000.0, 2000.0, 4000.0) * 2, 1.0, True),
+        ((1000.0,) * 3, 1.5, True),
+    ],
+)
+def test_recordings_of_different_objects_or_units_given_as_one_are_refused(stiffnesses, scale, told):
+    config = SimConfig(sensor="ideal", pad_stiffness_n_m=float("inf"))
+    scaled, *others = [recorded(lambda closure, k=k: k * closure) for k in stiffnesses]
+    scaled = evolve(scaled, trace=evolve(scaled.trace, gap_m=scale * scaled.trace.gap_m))
+    # Copies would be left out.
+    others = [evolve(own, trace=evolve(own.trace, t_s=own.trace.t_s + i)) for i, own in enumerate(others)]
+    result = identify(config, [scaled, *others], lambda *_: None)
+    assert any(open_.in_scene and "kind of object" in open_.what for open_ in result.undetermined) == told
+
+
+@every_case("seed", range(3))
+def test_noise_is_no_break(seed):
+    noise = np.random.default_rng(seed)
+    noisy = ready(lambda closure: 1000.0 * closure + 0.6 * noise.standard_normal(len(closure)))
+    assert noisy.broken_n is None
 
 
 def test_a_setting_that_the_recordings_have_with_another_value_is_not_ignored_silently():
@@ -174,10 +207,12 @@ def test_without_one_object_the_common_stiffness_is_the_mean_of_the_others():
     squeezes = [ready(lambda closure, k=k: force(closure, k)) for k in (900.0, 1200.0, 1000.0, 800.0, 1100.0)]
     law = static_candidates(scale_of(squeezes))[2]
     model = ForwardModel(pads=RIGID_PADS)
-    again = refits(fit(model, law, squeezes), np.random.default_rng(0), has_lag=False)
+    again = parts_of(fit(model, law, squeezes))
 
     # Where it stayed that of all objects, the jackknife would find too little scatter between them.
-    assert np.mean(np.log([refit.factors for refit in again.fits]), axis=1) == pytest.approx(0.0, abs=1e-9)
+    assert np.mean(np.log([part.fitted.factors for part in again.parts]), axis=1) == pytest.approx(
+        0.0, abs=1e-9
+    )
 
 
 def test_breaks_give_the_force_of_the_fracture_with_its_spread_and_what_is_left():

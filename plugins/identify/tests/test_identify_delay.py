@@ -8,7 +8,7 @@ from attrs import evolve
 from cases import every_case
 from squeezes import delayed, grasped, recorded
 
-from graspsense_identify.delay import Delay, Lag, Timed, with_delay
+from graspsense_identify.delay import Delay, Timed, with_delay
 from graspsense_identify.prepare import prepared
 from graspsense_identify.run import identify
 from graspsense_identify.share import WHOLE
@@ -79,15 +79,15 @@ def test_the_delay_that_is_reported_is_the_one_that_is_used(shown_s):
     ],
 )
 def test_a_delay_is_used_only_if_the_terms_that_are_chosen_with_it_show_it(found_s, shown, used_s):
-    def timed(lag):
-        return Timed(WHOLE, None, lag)
+    def timed(lag_s):
+        return Timed(WHOLE, None, lag_s)
 
     def delay(used):
-        return delay_of(used.lag.lag_s, shown(used.lag.lag_s), 0.00151)
+        return delay_of(used.lag_s, shown(used.lag_s), 0.00151)
 
-    used, told = with_delay(timed, lambda choice: Lag(lag_s=found_s, error_s=1e-3), delay)
+    used, told = with_delay(timed, lambda choice: found_s, delay)
     assert told.used_s == pytest.approx(used_s, abs=1e-9)
-    assert used.lag.lag_s == told.used_s
+    assert used.lag_s == told.used_s
 
 
 @pytest.mark.slow

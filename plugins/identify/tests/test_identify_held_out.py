@@ -11,8 +11,8 @@ from graspsense.simulator_api import SqueezeFit, Undetermined
 from graspsense_identify.choose import choose
 from graspsense_identify.fit import fit
 from graspsense_identify.forward import RIGID_PADS, ForwardModel
-from graspsense_identify.held_out import held_out_errors
 from graspsense_identify.laws import scale_of, static_candidates
+from graspsense_identify.parts import parts_of
 from graspsense_identify.prepare import prepared
 from graspsense_identify.refuse import refusals
 from graspsense_identify.run import _distinct, identify
@@ -30,14 +30,14 @@ def test_a_recording_is_predicted_by_others_without_its_own_stiffness():
     squeezes = [prepared(squeeze, 0.0) for squeeze in springs(1000.0, 1500.0)]
     spring = static_candidates(scale_of(squeezes))[0]
     fitted = fit(RIGID, spring, squeezes)
-    soft_error, stiff_error = held_out_errors(fitted)
+    soft_error, stiff_error = parts_of(fitted).squeeze_errors
 
     # At the peak, the force is wrong by a half or a third; a width of its own hides a part of that.
     assert 0.08 < min(soft_error, stiff_error) < max(soft_error, stiff_error) < 0.2
     # With a stiffness of its own, each seems to be known.
     chosen = choose(RIGID, squeezes, scale_of(squeezes), False, lambda done, total: None)
     assert chosen.scores[0].error < 0.01
-    assert held_out_errors(fitted.part([0])) == ()
+    assert parts_of(fitted.part([0])).squeeze_errors == ()
 
 
 def test_a_first_estimate_of_a_width_that_is_far_off_does_not_spoil_the_errors_of_candidates():
@@ -45,7 +45,8 @@ def test_a_first_estimate_of_a_width_that_is_far_off_does_not_spoil_the_errors_o
     soft = evolve(soft, width_m=soft.width_m + 0.009)
     fitted = fit(RIGID, static_candidates(scale_of([stiff]))[0], [soft, stiff])
     # Begun where the width of the other one is beside its estimate, the stiff one is missed by 64 %.
-    assert max(held_out_errors(fitted, own_stiffness=True)) < 0.001
+    errors = [part.errors(own_stiffness=True) for part in parts_of(fitted).parts]
+    assert np.max(errors) < 0.001
 
 
 @pytest.mark.slow

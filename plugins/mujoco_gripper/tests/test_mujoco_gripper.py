@@ -131,21 +131,36 @@ def test_the_gap_may_come_from_a_joint_or_from_geoms(grasped, tmp_path):
     assert by_joint == pytest.approx(by_geoms, abs=2e-4)
 
 
-@pytest.mark.slow
-def test_a_touch_sensor_measures_the_force_of_the_contacts(grasped, tmp_path):
-    faces = {side: f'<site name="{side}_face" pos="0 0 0"/>' for side in ("left", "right")}
+def touching(folder, *, cutoff="", sites=("left_zone", "right_zone")):
+    """Return the gripper file with a touch sensor at each of these sites."""
     zone = '<site name="{}_zone" type="box" size="0.006 0.012 0.012"/>'
-    sensor = (
-        '<sensor><touch name="lt" site="left_zone"/><touch name="rt" site="right_zone"/></sensor></mujoco>'
+    sensors = "".join(
+        f'<touch name="{name}" site="{site}" {cutoff}/>'
+        for name, site in zip(("lt", "rt"), sites, strict=True)
     )
+    faces = {side: f'<site name="{side}_face" pos="0 0 0"/>' for side in ("left", "right")}
     zones = [(face, face + zone.format(side)) for side, face in faces.items()]
-    file = gripper_with(
-        tmp_path,
-        replaced(*zones, ("</mujoco>", sensor)),
+    return gripper_with(
+        folder,
+        replaced(*zones, ("</mujoco>", f"<sensor>{sensors}</sensor></mujoco>")),
         left='{ geoms = ["left_pad"], sensor = "lt" }',
         right='{ geoms = ["right_pad"], sensor = "rt" }',
     )
+
+
+@pytest.mark.slow
+def test_a_touch_sensor_measures_the_force_of_the_contacts(grasped, tmp_path):
+    file = touching(tmp_path)
     assert grasped(f"gripper.file={file}", thing="can").features["f_steady"] == pytest.approx(20.0, abs=0.2)
+
+
+def test_a_sensor_that_shows_no_more_ends_the_grasp_and_one_for_both_fingers_is_refused(grasped, tmp_path):
+    file = touching(tmp_path, cutoff='cutoff="5"')
+    trial = grasped(f"gripper.file={file}")
+    assert "cutoff of 5 N" in trial.reason
+    with pytest.raises(ConfigError) as error:
+        opened(touching(tmp_path, sites=("left_zone", "left_zone")))
+    assert {"'lt'", "'rt'"} <= set(str(error.value).split())
 
 
 AT = '{ body = "%s", at = [0, 0, 0] }'
@@ -160,6 +175,10 @@ AT = '{ body = "%s", at = [0, 0, 0] }'
         ({"open": "[20.0]", "closed": "[-20.0]"}, ("do not close",)),
         ({"open": "[1.0, 2.0]"}, ("open has 2 values",)),
         ({"gap": '{ joint = "left", scale = -1.0, offset_m = 0.09 }'}, ("scale", "16.1 mm", "32.2 mm")),
+        *(
+            ({"gap": f'{{ joint = "left", scale = -2.0, offset_m = {offset_m} }}'}, ("offset_m", "left"))
+            for offset_m in (0.07, 0.045)
+        ),
         ({"gap": "{ }"}, ("one of sites, geoms and joint",)),
         ({"actuator": '["close"]'}, ("actuator", "actuators")),
         ({"channels": '{ palm = { sensor = "nosuch", unit = "m/s2" } }'}, ("sensor", "nosuch")),
@@ -246,8 +265,9 @@ def test_a_thing_that_is_squeezed_beside_what_measures_ends_the_grasp(grasped, t
     assert "no finger feels" in trial.reason
 
 
-def test_contacts_that_a_model_switches_off_are_there_in_a_grasp(grasped, tmp_path):
-    switched = replaced(('"implicitfast"/>', '"implicitfast"><flag contact="disable"/></option>'))
+@pytest.mark.parametrize("part", ["contact", "equality", "actuation"])
+def test_what_a_grasp_needs_is_there_though_the_model_switches_it_off(grasped, tmp_path, part):
+    switched = replaced(('"implicitfast"/>', f'"implicitfast"><flag {part}="disable"/></option>'))
     assert grasped(f"gripper.file={gripper_with(tmp_path, switched)}").outcome.words == "steady"
 
 

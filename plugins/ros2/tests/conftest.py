@@ -26,5 +26,4 @@ def robot(router):
 
     yield start
     for robot in running:
-        robot.process.kill()
-        robot.process.communicate()
+        robot.end()

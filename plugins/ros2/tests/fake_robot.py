@@ -1,4 +1,5 @@
-"""A robot with a gripper, in a process of its own: topics at 100 Hz and an action. It prints a line for each goal.
+"""A robot with a gripper, in a process of its own: topics at 100 Hz and an action. It prints `ready`, and a line
+for each goal.
 
 python fake_robot.py KIND: KIND is GripperCommand or ParallelGripperCommand. A line of its input is a fault from now on:
 silent (no wrenches), nan, wrong (bytes that are no wrench), late (stamps that fall behind), behind (messages come
@@ -102,6 +103,9 @@ def main(kind):
         joints(states[0] if behind else states[-2] if again else states[-1])
         if hand.fault != "silent":
             wrench(wrenches[0 if behind else -1])
+        if sent == 1:
+            sys.stdout.write("ready\n")
+            sys.stdout.flush()
         due_s += 1.0 / RATE_HZ
         time.sleep(max(0.0, due_s - time.monotonic()))
 

@@ -1,7 +1,7 @@
 """The gripper behind ROS 2 passes the conformance checks, with the fake robot behind it."""
 
 import pytest
-from robots import OPTIONS
+from robots import OPTIONS, TRIES
 
 from graspsense.testing import examine
 
@@ -14,6 +14,11 @@ def test_the_gripper_conforms(robot):
     robot()
     keys = {key: KEYS[key] for key in EXPRESSIONS} | {"silent_s": 1.0}
 
-    report = examine("graspsense-ros2/ros2", keys=keys, absent={"action": "/nobody"}, wheel=False).report()
+    for _ in range(TRIES):
+        report = examine(
+            "graspsense-ros2/ros2", keys=keys, absent={"action": "/nobody"}, wheel=False
+        ).report()
+        if "aborted" not in str(report.failures):
+            break
 
     assert report.failures == []

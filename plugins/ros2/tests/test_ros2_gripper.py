@@ -1,7 +1,7 @@
 """A gripper behind ROS 2, against a robot in another process, sound and with faults."""
 
 import pytest
-from robots import OPTIONS
+from robots import OPTIONS, TRIES
 
 from graspsense.core.pipeline.pipeline import load_pipeline
 from graspsense.core.values.signals import Outcome
@@ -9,30 +9,25 @@ from graspsense.core.values.signals import Outcome
 OBJECT_M = 0.05
 
 
-def grasp(on_event=None, *options):
-    return load_pipeline("default", options=[*OPTIONS, *options]).grasp(on_event=on_event)
+def undisturbed(start, *options, phase="SQUEEZE", act=lambda robot: None):
+    """Return a robot, and a grasp with it that was not aborted. `act` acts on the robot in this phase of the grasp.
 
-
-def undisturbed(*options):
-    """Return a grasp in which no frame was lost, or the third one: a machine that is held up loses some."""
-    for _ in range(3):
-        trial = grasp(None, *options)
-        if trial.outcome == Outcome.STEADY or "lost:" not in trial.reason:
+    In the squeeze the object is between the fingers.
+    """
+    for _ in range(TRIES):
+        fake = start()
+        pipeline = load_pipeline("default", options=[*OPTIONS, *options])
+        trial = pipeline.grasp(on_event=lambda event, fake=fake: event.phase.name == phase and act(fake))
+        if trial.outcome != Outcome.ABORTED:
             break
-    return trial
-
-
-def at_squeeze(act):
-    """Return what acts in the squeeze, when the object is between the fingers."""
-    return lambda event: act() if event.phase.name == "SQUEEZE" else None
+        fake.end()
+    return fake, trial
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["GripperCommand", "ParallelGripperCommand"])
 def test_a_grasp_by_topics_and_action(robot, kind):
-    sound = robot(kind)
-
-    trial = undisturbed(f"gripper.action_type={kind}")
+    sound, trial = undisturbed(lambda: robot(kind), f"gripper.action_type={kind}")
 
     assert trial.outcome == Outcome.STEADY, trial.reason
     forces = trial.trace.force_left_n
@@ -55,10 +50,8 @@ def test_a_grasp_by_topics_and_action(robot, kind):
     ],
 )
 def test_a_fault_of_a_topic_ends_the_grasp_and_opens_the_fingers(robot, fault, words):
-    faulty = robot()
-
     # So long a hold that the grasp does not end before the fault is seen.
-    trial = grasp(at_squeeze(lambda: faulty.fault(fault)), "run.hold_s=5")
+    faulty, trial = undisturbed(robot, "run.hold_s=5", act=lambda fake: fake.fault(fault))
 
     assert trial.outcome == Outcome.DEVICE_LOST
     assert words in trial.reason
@@ -71,9 +64,7 @@ def test_a_fault_of_a_topic_ends_the_grasp_and_opens_the_fingers(robot, fault, w
     ("fault", "name"), [("", None), ("behind", "messages late"), ("twice", "messages repeated")]
 )
 def test_messages_that_come_late_or_twice_are_told(robot, fault, name):
-    faulty = robot()
-
-    trial = grasp(lambda event: faulty.fault(fault) if event.phase.name == "APPROACH" else None)
+    _, trial = undisturbed(robot, phase="APPROACH", act=lambda fake: fake.fault(fault))
 
     # A machine that is held up has late messages too.
     told = {warning.split(":")[0] for warning in trial.warnings} & {"messages late", "messages repeated"}
@@ -82,9 +73,7 @@ def test_messages_that_come_late_or_twice_are_told(robot, fault, name):
 
 @pytest.mark.slow
 def test_a_topic_that_stops_while_the_fingers_open_leaves_them_open(robot):
-    faulty = robot()
-
-    trial = grasp(lambda event: faulty.fault("silent") if event.phase.name == "RELEASE" else None)
+    faulty, trial = undisturbed(robot, phase="RELEASE", act=lambda fake: fake.fault("silent"))
 
     assert trial.report["told_to_open"] is True
     assert faulty.goals()[-1]["position"] == 0.085
@@ -92,9 +81,7 @@ def test_a_topic_that_stops_while_the_fingers_open_leaves_them_open(robot):
 
 @pytest.mark.slow
 def test_a_robot_that_dies_ends_the_grasp(robot):
-    dying = robot()
-
-    trial = grasp(at_squeeze(dying.process.kill))
+    _, trial = undisturbed(robot, act=lambda fake: fake.process.kill())
 
     assert trial.outcome == Outcome.DEVICE_LOST
     assert trial.report["told_to_open"] is False
@@ -102,9 +89,7 @@ def test_a_robot_that_dies_ends_the_grasp(robot):
 
 @pytest.mark.slow
 def test_goals_that_are_refused_end_the_grasp(robot):
-    refusing = robot()
-
-    trial = grasp(at_squeeze(lambda: refusing.fault("refuse")))
+    _, trial = undisturbed(robot, act=lambda fake: fake.fault("refuse"))
 
     assert trial.outcome == Outcome.DEVICE_LOST
     assert "refuses" in trial.reason

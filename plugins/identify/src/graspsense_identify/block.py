@@ -40,7 +40,7 @@ def lag_of_block(config: SimConfig, block: Sequence[RecordedSqueeze]) -> float:
     has no contact or too few measurements of the force.
     """
     ready = [prepared(squeeze, config.force_delay_s) for squeeze in block]
-    return lag_beyond_settings(_fitted(ready)).lag_s
+    return lag_beyond_settings(_fitted(ready))
 
 
 def with_fingertips_of_block(

@@ -9,26 +9,25 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from itertools import count
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
-from attrs import evolve, frozen
+from attrs import frozen
 from numpy.typing import NDArray
 
 from graspsense.simulator_api import CandidateScore
 from graspsense_identify.corners import with_corners
 from graspsense_identify.fit import LEAST_ERROR, Fitted, fit, in_threads
 from graspsense_identify.forward import ForwardModel
-from graspsense_identify.held_out import held_out_errors
 from graspsense_identify.laws import DataScale, memories, static_candidates
+from graspsense_identify.parts import parts_of
 from graspsense_identify.prepare import Squeeze
 
 Floats = NDArray[np.float64]
 
-STRETCHES: Final = 9
+SQUEEZE_FOLDS: Final = 5
 STRETCH_FOLDS: Final = 3
-STATIC_KEPT: Final = 3
-"""Static laws that are tried with every memory."""
+"""Parts of the squeezes, or of a single one, by which a candidate is judged."""
 WORTH_KEEPING: Final = 4.0
 """A candidate whose residual is larger than the least by this factor is not tried with a lag."""
 WORTH_TRYING: Final = 3.0
@@ -37,10 +36,6 @@ MANY: Final = 4
 """Candidates that are usually judged, for the progress."""
 MANY_EVALUATIONS: Final = 400
 """Of the chosen fit, so that it converges in a flat valley, too."""
-BRANCH_TIME: Final = "maxwell.tau_s"
-AS_A_DAMPER: Final = 2.0
-"""A branch that relaxes within this multiple of the shortest time of the range, which is less than the time between two
-measurements, is shown as a damper only."""
 LEAST_GAIN: Final = 0.03
 """A term more has to reduce the error on held-out data by at least this share."""
 
@@ -55,8 +50,7 @@ class Choice:
     scores: tuple[CandidateScore, ...]
 
 
-@frozen(kw_only=True, eq=False)
-class _Judged:
+class _Judged(NamedTuple):
     fitted: Fitted
     errors: Floats
     """The rms residual over the peak in each held-out part."""
@@ -85,34 +79,24 @@ def choose(
     order = sorted(range(len(squeezes)), key=lambda i: squeezes[i].force_n.tobytes())
     squeezes, given = [squeezes[i] for i in order], np.argsort(order).tolist()
     laws, with_memory = static_candidates(scale), memories(scale) if has_memory else []
-    total = (3 if has_memory else 1) * len(laws) + STATIC_KEPT * len(with_memory) + MANY
+    total = (1 + len(with_memory)) * len(laws) + MANY
     numbers = count(1)
 
     def done() -> None:
         progress(min(next(numbers), total), total)
 
-    alone = in_threads(lambda law: fit(model, with_corners(model, law, squeezes), squeezes), laws, done)
-    rough = alone
-    if has_memory:
-        # From its own starts, and from the fit without a memory, which has the corners of the law.
-        branched = [law.joined(with_memory[1]) for law in laws]
-        branched += [law.starting_at(own.by_label) for law, own in zip(branched, alone, strict=True)]
-        tried = in_threads(lambda law: fit(model, law, squeezes), branched, done)
-        pairs = zip(tried[: len(laws)], tried[len(laws) :], strict=True)
-        rough = [min(pair, key=lambda fitted: fitted.rms) for pair in pairs]
-    kept = _kept(rough)
-    joined = [laws[k].joined(memory).starting_at(rough[k].by_label) for k in kept for memory in with_memory]
-    fits = [alone[k] for k in kept] + in_threads(lambda law: fit(model, law, squeezes), joined, done)
+    fits = in_threads(lambda law: fit(model, with_corners(model, law, squeezes), squeezes), laws, done)
+    joined = [own.candidate.joined(memory).starting_at(own.values) for own in fits for memory in with_memory]
+    fits += in_threads(lambda law: fit(model, law, squeezes), joined, done)
     dampers = [fitted for fitted in fits if _is_damped_by_branch(fitted)]
     fits = [fitted for fitted in fits if fitted not in dampers]
     least = min(fitted.error for fitted in fits)
     worth = [
         fitted for fitted in fits if fitted.rms <= WORTH_TRYING * least and not _adds_nothing(fitted, fits)
     ]
-    judged = in_threads(lambda fitted: _Judged(fitted=fitted, errors=_held_out(fitted)), worth, done)
+    judged = in_threads(_judged, worth, done)
     best = _simplest(judged)
-    dropped = [fitted for k, fitted in enumerate(rough) if k not in kept]
-    scores = [_score(fitted, best, judged, fits) for fitted in [*fits, *dampers, *dropped]]
+    scores = [_score(fitted, best, judged, fits) for fitted in [*fits, *dampers]]
     return Choice(
         fitted=best.fitted.refitted(max_evaluations=MANY_EVALUATIONS).part(given),
         refined=tuple(fitted.part(given) for fitted in fits if fitted.rms <= WORTH_KEEPING * least),
@@ -120,17 +104,11 @@ def choose(
     )
 
 
-def _kept(rough: Sequence[Fitted]) -> list[int]:
-    """Return which laws are tried with every memory: those that fit best."""
-    order = np.argsort([fitted.rms for fitted in rough], kind="stable").tolist()
-    # The simplest law stays among the candidates, so that the table shows what it costs to leave the others out.
-    return sorted({0, *order[:STATIC_KEPT]})
-
-
 def _is_damped_by_branch(fitted: Fitted) -> bool:
     """Return whether its branch relaxes between two measurements, as a damper does: `loss` says so by one number."""
-    shortest_s = {parameter.label: parameter.low for parameter in fitted.candidate.free}
-    return fitted.by_label.get(BRANCH_TIME, math.inf) <= AS_A_DAMPER * shortest_s.get(BRANCH_TIME, 0.0)
+    free = fitted.candidate.free
+    shortest = zip(free, fitted.values, strict=True)
+    return any(parameter.name == "tau_s" and value < 1.02 * parameter.low for parameter, value in shortest)
 
 
 def _adds_nothing(fitted: Fitted, fits: Sequence[Fitted]) -> bool:
@@ -152,21 +130,11 @@ def _rank(score: CandidateScore) -> tuple[bool, float, float]:
     return not score.chosen, math.inf if math.isnan(score.error) else score.error, score.fit_error
 
 
-def _held_out(fitted: Fitted) -> Floats:
+def _judged(fitted: Fitted) -> _Judged:
     """Return the errors of a candidate on squeezes, or on stretches of a single one, that it was not fitted to."""
-    if len(fitted.squeezes) > 1:
-        return np.array(held_out_errors(fitted, own_stiffness=True))
-    (squeeze,) = fitted.squeezes
-    samples = len(squeeze.force_n)
-    stretch = np.minimum(np.arange(samples) * STRETCHES // samples, STRETCHES - 1)
-    errors = []
-    for k in range(STRETCH_FOLDS):
-        is_left_out = stretch % STRETCH_FOLDS == k
-        part = evolve(fitted, squeezes=[squeeze.only(~is_left_out)]).refitted()
-        (forces,) = evolve(part, squeezes=[squeeze]).forces()
-        residuals = (forces - squeeze.force_n)[is_left_out] / squeeze.peak_n
-        errors.append(np.sqrt(np.mean(residuals**2)))
-    return np.array(errors)
+    folds = SQUEEZE_FOLDS if len(fitted.squeezes) > 1 else STRETCH_FOLDS
+    parts = parts_of(fitted, folds).parts
+    return _Judged(fitted, np.concatenate([part.errors(own_stiffness=True) for part in parts]))
 
 
 def _simplest(judged: Sequence[_Judged]) -> _Judged:
@@ -190,10 +158,8 @@ def _score(
     elif own is not None:
         more = "more parameters, " if len(fitted.values) > len(best.fitted.values) else ""
         verdict = f"{more}error {100.0 * (own.error / best.error - 1.0):+.0f} %"
-    elif _is_damped_by_branch(fitted):
-        verdict = "its branch relaxes between two measurements: a loss"
     elif fitted not in fits:
-        verdict = f"not among the {STATIC_KEPT} laws that fit best"
+        verdict = "its branch relaxes between two measurements: a loss"
     elif _adds_nothing(fitted, fits):
         verdict = "fits no better than with fewer terms"
     else:

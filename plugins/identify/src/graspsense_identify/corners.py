@@ -5,15 +5,15 @@ A fit starts at the corners of the law that explain the measured forces best.
 Between its corners a snap-through is a straight line. For given corners its force is linear in the two stiffnesses, the
 drop, and the product of stiffness and an error of the width. So the corners are tried on a grid, and the other numbers
 follow from linear least squares (separable least squares: Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973). The
-minima of the grid are then refined. The derivatives of a fit jump where a corner passes a sample, so the minimum that
-it reaches from coarse corners can depend on rounding.
+derivatives of a fit jump where a corner passes a sample, so the minimum that it reaches from coarse corners can depend
+on rounding: the grid is fine.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from attrs import evolve
@@ -26,19 +26,12 @@ from graspsense_identify.prepare import CONTACT_SHARE, Squeeze
 
 Floats = NDArray[np.float64]
 
-CRITICAL: Final = np.linspace(0.04, 0.96, 47)
+CRITICAL: Final = np.linspace(0.04, 0.96, 93)
 """Critical compressions that are tried, over the largest compression."""
-FALL: Final = np.geomspace(0.01, 0.8, 18)
+FALL: Final = np.geomspace(0.01, 0.8, 36)
 """Lengths of the fall that are tried, over the largest compression."""
-TRIED: Final = 12
-"""Minima of the grid that are refined."""
-BEST: Final = 4
-"""Refined minima from which a fit starts."""
-REACH: Final = (0.02, 0.26)
-"""First steps of the refinement: of the critical compression over the largest one, and of the logarithm of the fall's
-length."""
-EVALUATIONS: Final = 80
-"""Of the refinement of a minimum."""
+BEST: Final = 6
+"""Minima of the grid from which a fit starts."""
 LEAST_SAMPLES: Final = 6
 """Of a squeeze during the compression; four numbers follow from them."""
 WIDTH_WEIGHT: Final = 0.01
@@ -53,10 +46,6 @@ MOVING_SHARE: Final = 0.3
 """Where the gap changes by at least this share of its largest change between measurements, the fingers move."""
 LEAST_FALLING: Final = 2
 """Samples on the falling part of a snap-through that determine its line."""
-MEAN_OVER_CORNER: Final = 0.015
-"""Rms error of the mean over a sample in which the law has a corner, over the change of its slope and the distance
-between samples: `Squeeze.at_samples` knows the forces at the ends and in the middle only. The rms is over corners that
-lie anywhere in the sample."""
 
 
 class _Load(NamedTuple):
@@ -89,7 +78,7 @@ def with_corners(model: ForwardModel, law: CandidateLaw, squeezes: Sequence[Sque
     depth = float(np.median([load.compression[-1] for load in loads_m]))
     loads = [load._replace(compression=load.compression / depth) for load in loads_m]
     peak_n = float(np.median([squeeze.peak_n for squeeze in squeezes]))
-    starts = [_start(corners, depth, peak_n) for corners in _minima(loads)]
+    starts = [_start(*corners, depth, peak_n) for corners in zip(*_minima(loads), strict=True)]
     # The error of the width by the force at the contact is itself in error by noise.
     return evolve(law, more_starts=(*starts, *(start._replace(wider_m=0.0) for start in starts)))
 
@@ -103,44 +92,16 @@ def _loading(model: ForwardModel, squeeze: Squeeze) -> _Load:
     return _Load(compression[part], force[part])
 
 
-def _minima(loads: Sequence[_Load]) -> list[_Corners]:
-    """Return the best minima over the corners, the best one first, each with a single pair of corners."""
+def _minima(loads: Sequence[_Load]) -> _Corners:
+    """Return the pairs of corners of the best minima on the grid, the best one first."""
     critical, fall = (axis.ravel() for axis in np.meshgrid(CRITICAL, FALL, indexing="ij"))
     tried = _at_corners(loads, critical, fall)
     cost = tried.cost.reshape(len(CRITICAL), len(FALL))
     bordered = np.pad(cost, 1, constant_values=np.inf)
     neighbours = np.lib.stride_tricks.sliding_window_view(bordered, (3, 3)).min(axis=(2, 3))
     minima = np.flatnonzero((cost <= neighbours) & np.isfinite(cost))
-    minima = minima[np.argsort(tried.cost[minima], kind="stable")][:TRIED]
-    refined = [_refined(loads, float(critical[k]), float(fall[k])) for k in minima.tolist()]
-    # Corners between the same samples often explain them equally well, so only the best of these is kept.
-    by_division: dict[tuple[int, ...], _Corners] = {}
-    for corners in sorted(refined, key=lambda corners: float(corners.cost[0])):
-        by_division.setdefault(_division(loads, corners), corners)
-    return list(by_division.values())[:BEST]
-
-
-def _division(loads: Sequence[_Load], corners: _Corners) -> tuple[int, ...]:
-    """Return the numbers of samples before each corner."""
-    ends = (corners.critical, corners.critical + corners.fall)
-    return tuple(int(np.count_nonzero(load.compression < end)) for load in loads for end in ends)
-
-
-def _refined(loads: Sequence[_Load], critical: float, fall: float) -> _Corners:
-    """Return the minimum near these corners, by a simplex: the slope of the cost jumps at each sample."""
-    from scipy.optimize import minimize
-
-    def corners(x: Floats) -> _Corners:
-        return _at_corners(loads, np.maximum(x[:1], 0.5 * CRITICAL[0]), np.exp(x[1:]))
-
-    def cost(x: Floats) -> float:
-        return float(corners(x).cost[0])
-
-    start = np.array([critical, np.log(fall)])
-    simplex = start + np.array([(0.0, 0.0), (REACH[0], 0.0), (0.0, REACH[1])])
-    options: Any = {"initial_simplex": simplex, "maxfev": EVALUATIONS}
-    best = minimize(cost, start, method="Nelder-Mead", options=options)
-    return corners(best.x)
+    best = minima[np.argsort(tried.cost[minima], kind="stable")][:BEST]
+    return _Corners(*(column[best] for column in tried))
 
 
 def _at_corners(loads: Sequence[_Load], critical: Floats, fall: Floats) -> _Corners:
@@ -169,15 +130,17 @@ def _at_corners(loads: Sequence[_Load], critical: Floats, fall: Floats) -> _Corn
     return _Corners(critical, fall, np.where(snaps, cost, np.inf), median)
 
 
-def _start(corners: _Corners, depth: float, peak_n: float) -> FitStart:
-    """Return the start at a pair of corners."""
-    offset, k1, drop, k2 = corners.numbers[0].tolist()
+def _start(
+    critical: float, fall: float, _cost: float, numbers: Floats, depth: float, peak_n: float
+) -> FitStart:
+    """Return the start at a pair of corners, with the numbers that follow from them."""
+    offset, k1, drop, k2 = numbers.tolist()
     # A force at the contact is that of a wider object, whose compression is larger by as much.
     wider = offset / k1
-    shares = (k1, float(corners.critical[0]) + wider, drop, float(corners.fall[0]), k2)
     stiffness = peak_n / depth
     units = (stiffness, depth, peak_n, depth, stiffness)
-    return FitStart(tuple(np.multiply(shares, units).tolist()), wider * depth)
+    values = np.multiply((k1, float(critical) + wider, drop, float(fall), k2), units)
+    return FitStart(tuple(values.tolist()), wider * depth)
 
 
 def corner_errors(fitted: Fitted) -> Floats:
@@ -195,7 +158,7 @@ def corner_errors(fitted: Fitted) -> Floats:
     moving = np.concatenate([way[way > MOVING_SHARE * np.max(way)] for way in ways])
     share = math.sqrt(1.0 / 6.0)
     if _on_falling_part(fitted, values["snap.critical_m"], values["snap.fall_m"]) >= LEAST_FALLING:
-        share = MEAN_OVER_CORNER if any(np.any(squeeze.averaged_s2 > 0.0) for squeeze in squeezes) else 0.0
+        share = 0.0
     error_m = share * float(np.median(moving)) / math.sqrt(len(squeezes))
     errors = {
         "snap.critical_m": error_m,

@@ -16,21 +16,19 @@ from collections.abc import Callable, Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
-from attrs import evolve, frozen
+from attrs import frozen
 
 from graspsense.simulator_api import IdentifiedParameter, Undetermined
 from graspsense_identify.choose import LEAST_GAIN, Choice
-from graspsense_identify.fit import Fitted, in_threads, information
+from graspsense_identify.fit import LEAST_ERROR, Fitted, in_threads, information, linear_covariance
 from graspsense_identify.interval import identified, normal
+from graspsense_identify.parts import has_objects, parts_of
 from graspsense_identify.prepare import MAX_LAG_S
 from graspsense_identify.refuse import shows_memory
 from graspsense_identify.share import Shares
-from graspsense_identify.spread import has_objects, refits
 
 EVIDENCE: Final = 5.0
 """The logarithm of the Bayes factor (Schwarz's approximation) from which on a lag is taken for real."""
-PLAUSIBLE: Final = 10.0
-"""Candidates with a lag that are within this of the best one are plausible, unless a simpler one is better."""
 WIDEST_S: Final = 0.02
 """A delay whose interval is wider is not determined."""
 PATH_ERROR_S: Final = 5e-4
@@ -92,22 +90,12 @@ class Delay:
         ]
 
 
-@frozen(kw_only=True)
-class Lag:
-    """By how much the force lags beyond the delay of the settings."""
-
-    lag_s: float = 0.0
-    """0 where the recordings show no lag."""
-    error_s: float = 0.0
-    """Its standard deviation from the choice of the terms, and from the finite number of nodes."""
-
-
-def lag_of(choice: Choice) -> Lag:
-    """Return the lag of the force beyond the settings.
+def lag_of(choice: Choice) -> float:
+    """Return by how much the force lags beyond the settings (s); 0 where the recordings show no lag.
 
     Common values that do not hold for all objects fit badly, and a lag may mimic that: no lag is taken from these.
     """
-    return Lag() if _values_vary(choice.fitted) else lag_beyond_settings(choice.refined)
+    return 0.0 if _values_vary(choice.fitted) else lag_beyond_settings(choice.refined)
 
 
 def _values_vary(fitted: Fitted) -> bool:
@@ -122,50 +110,37 @@ def _values_vary(fitted: Fitted) -> bool:
     return information(rms, values * len(alone), n) <= common - EVIDENCE
 
 
-def lag_beyond_settings(refined: Sequence[Fitted]) -> Lag:
-    """Return the lag without which none of these candidates fits as well.
+def lag_beyond_settings(refined: Sequence[Fitted]) -> float:
+    """Return the lag (s) without which none of these candidates fits as well; 0 if there is none.
 
     `refined`: fits with the times as they are.
     """
     if not shows_memory(refined[0].squeezes):
-        return Lag()
+        return 0.0
     lagging = in_threads(lambda fitted: fitted.refitted(has_lag=True), refined)
     best = min(lagging, key=lambda fitted: fitted.information)
     own = refined[lagging.index(best)]
     gained = best.information <= min(fitted.information for fitted in refined) - EVIDENCE
     better = best.error <= (1.0 - LEAST_GAIN) * own.error
-    if not gained or not better or abs(best.lag_s) > 0.98 * MAX_LAG_S:
-        return Lag()
-    near = [fitted for fitted in lagging if fitted.information <= best.information + PLAUSIBLE]
-    lags = [fitted.lag_s for fitted in near if not _is_dominated(fitted, near)]
-    return Lag(
-        lag_s=best.lag_s,
-        error_s=math.hypot(PATH_ERROR_S, max(abs(lag - best.lag_s) for lag in lags) / normal()),
-    )
+    is_real = gained and better and abs(best.lag_s) <= 0.98 * MAX_LAG_S
+    return best.lag_s if is_real else 0.0
 
 
-def _is_dominated(fitted: Fitted, others: Sequence[Fitted]) -> bool:
-    """Return whether a simpler candidate has more evidence."""
-    return any(
-        other.parameters < fitted.parameters and other.information < fitted.information for other in others
-    )
-
-
-def delay_of(fitted: Fitted, settings_s: float, lag: Lag) -> Delay:
+def delay_of(fitted: Fitted, settings_s: float, lag_s: float) -> Delay:
     """Return the delay of the sensor.
 
-    `fitted`: the chosen fit, to squeezes whose force lags by `lag`.
+    `fitted`: the chosen fit, to squeezes whose force lags by `lag_s`.
     """
-    used_s = settings_s + lag.lag_s
+    used_s = settings_s + lag_s
     if not shows_memory(fitted.squeezes):
         return Delay(settings_s=settings_s, used_s=used_s)
     lagging = fitted.refitted(has_lag=True)
-    again = refits(lagging, np.random.default_rng(0), has_lag=True)
-    lags = np.array([fitted.lag_s for fitted in again.fits])
-    scattered = again.factor * math.sqrt(again.scale * float(np.sum((lags - lags.mean()) ** 2)))
+    again = parts_of(lagging, has_lag=True)
+    lags = np.array([[part.fitted.lag_s] for part in again.parts])
+    scattered = again.factor * math.sqrt(float(again.covariance(lags)[0, 0]))
     # Where the motion does not show a lag, the fits stay where they begin and do not scatter.
-    random = max(scattered, normal() * lagging.lag_error_s)
-    half = math.hypot(random, normal() * max(lag.error_s, PATH_ERROR_S))
+    random = max(scattered, normal() * math.sqrt(linear_covariance(lagging, LEAST_ERROR)[-1, -1]))
+    half = math.hypot(random, normal() * PATH_ERROR_S)
     shown = used_s + lagging.lag_s
     return Delay(
         settings_s=settings_s,
@@ -186,28 +161,28 @@ class Timed(NamedTuple):
 
     shares: Shares
     choice: Choice
-    lag: Lag
+    lag_s: float
 
 
 def with_delay(
-    timed: Callable[[Lag], Timed], lag_of: Callable[[Choice], Lag], delay: Callable[[Timed], Delay]
+    timed: Callable[[float], Timed], lag_of: Callable[[Choice], float], delay: Callable[[Timed], Delay]
 ) -> tuple[Timed, Delay]:
     """Return the choice with the delay that is used.
 
     `timed` makes the choice with a lag, `lag_of` returns that which all candidates show, and `delay` what the chosen
-    terms show. That of the settings is
-    used where the interval of the chosen terms holds it, and where the lag does not settle.
+    terms show. That of the settings is used where the interval of the chosen terms holds it, and where the lag does
+    not settle.
     """
-    recorded = timed(Lag())
-    lag = lag_of(recorded.choice)
+    recorded = timed(0.0)
+    lag_s = lag_of(recorded.choice)
     for _ in range(MAX_ROUNDS):
-        if lag.lag_s == 0.0:
+        if lag_s == 0.0:
             break
-        corrected = timed(lag)
+        corrected = timed(lag_s)
         shown = delay(corrected)
         if shown.low_s <= shown.settings_s <= shown.high_s:
             break
         if abs(shown.shown_s - shown.used_s) <= PATH_ERROR_S:
             return corrected, shown
-        lag = evolve(lag, lag_s=shown.shown_s - shown.settings_s)
+        lag_s = shown.shown_s - shown.settings_s
     return recorded, delay(recorded)

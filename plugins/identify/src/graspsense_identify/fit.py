@@ -65,8 +65,6 @@ LAG_UNIT_S: Final = 0.01
 LAG_STEP: Final = 0.1
 """Difference of the lag in the Jacobian, in these units, to both sides: where a measurement passes the contact, the
 derivative jumps."""
-LAG_STARTS: Final = (0.0, 0.5, -0.5)
-"""Lags to start from, in these units."""
 LEAST_ERROR: Final = 1e-3
 """Errors below this share of the peak are those of the path's nodes: they tell no candidates apart."""
 MAX_EVALUATIONS: Final = 40
@@ -94,8 +92,8 @@ class Fitted:
     """Relative to the peak of each squeeze."""
     lag_s: float = 0.0
     """By how much the force lags behind the gap, beyond the times of the squeezes; 0 where it was not fitted."""
-    lag_error_s: float = math.nan
-    """Its standard deviation, by the linearised fit."""
+    has_lag: bool = False
+    """Whether it was fitted."""
 
     @property
     def rms(self) -> float:
@@ -110,7 +108,7 @@ class Fitted:
     @property
     def parameters(self) -> int:
         """The number of its free parameters, the lag included."""
-        return len(self.values) + int(math.isfinite(self.lag_error_s))
+        return len(self.values) + int(self.has_lag)
 
     @property
     def information(self) -> float:
@@ -151,11 +149,7 @@ class Fitted:
         The common stiffness of the result is the mean of these squeezes.
         """
         problem = _Problem(self.model, self.candidate, self.squeezes, has_lag=has_lag)
-        vector = problem.vector(self)
-        if not has_lag:
-            return problem.solved([vector], max_evaluations)
-        lags = LAG_STARTS if self.lag_s == 0.0 else (self.lag_s / LAG_UNIT_S,)
-        return problem.solved([np.append(vector, lag) for lag in lags], max_evaluations)
+        return problem.solved([problem.vector(self)], max_evaluations)
 
 
 def information(rms: float, parameters: int, n: int) -> float:
@@ -221,17 +215,19 @@ class _Problem:
         return _Point(np.exp(x[:p]), widths, factors, LAG_UNIT_S * float(x[-1]) if self.has_lag else 0.0)
 
     def vector(self, fitted: Fitted) -> Floats:
-        """Return the vector of a fit to these squeezes, without its lag."""
+        """Return the vector of a fit to these squeezes."""
         shares = (np.array(fitted.widths_m) - self.first_widths) / self.depths
         factors = np.log(fitted.factors)
         is_stiffness = np.array([parameter.is_stiffness for parameter in fitted.candidate.free])
         values = np.log(fitted.values) + float(np.mean(factors)) * is_stiffness
-        return np.concatenate([values, shares, factors @ self.contrasts])
+        return np.concatenate(
+            [values, shares, factors @ self.contrasts, [fitted.lag_s / LAG_UNIT_S] * self.has_lag]
+        )
 
     def _of_squeeze(self, squeeze: Squeeze, points: Sequence[tuple[Floats, float, float]]) -> Floats:
         """Return the residuals of a squeeze at these values, widths and factors, a row for each."""
         forces = [self.model.at_nodes(squeeze, self.candidate, *point) for point in points]
-        return relative(squeeze.at_samples(np.array(forces)) - squeeze.force_n, squeeze.peak_n)
+        return relative(np.array(forces)[:, squeeze.sample] - squeeze.force_n, squeeze.peak_n)
 
     def residuals(self, x: Floats) -> Floats:
         if self._last is None or not np.array_equal(self._last[0], x):
@@ -296,36 +292,30 @@ class _Problem:
             factors=tuple(factors.tolist()),
             residuals=best.fun,
             lag_s=lag_s,
-            lag_error_s=_lag_error_s(best.jac, best.fun) if self.has_lag else math.nan,
+            has_lag=self.has_lag,
         )
 
 
 def linear_covariance(fitted: Fitted, least_error: float) -> Floats:
-    """Return the covariance of the logarithms of the values that the residuals leave, by the linearised fit.
+    """Return the covariance that the residuals leave of the logarithms of the values, and of the lag (s) if it was
+    fitted, by the linearised fit.
 
     It is that of the values with a common stiffness which is the mean of the squeezes. `least_error`: by how much the
     forces of the model are wrong at least, over the peak. A direction that changes no force has a large variance.
     """
-    problem = _Problem(fitted.model, fitted.candidate, fitted.squeezes)
+    problem = _Problem(fitted.model, fitted.candidate, fitted.squeezes, has_lag=fitted.has_lag)
     jacobian = problem.jacobian(problem.vector(fitted))
     scale = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-12)
     _, singular, rows = np.linalg.svd(jacobian / scale, full_matrices=False)
     # The fit follows a part of the residuals' own errors, with as many directions as it has parameters.
     size, directions = jacobian.shape
     error = math.hypot(fitted.rms * math.sqrt(size / max(size - directions, 1)), least_error)
+    if fitted.has_lag:
+        scale[-1] /= LAG_UNIT_S
     root = (rows.T / np.maximum(singular, SMALLEST_SINGULAR) * error) / scale[:, np.newaxis]
-    covariance: Floats = (root @ root.T)[: problem.p, : problem.p]
+    kept = [*range(problem.p), *[-1] * fitted.has_lag]
+    covariance: Floats = (root @ root.T)[np.ix_(kept, kept)]
     return covariance
-
-
-def _lag_error_s(jacobian: Floats, residuals: Floats) -> float:
-    """Return the standard deviation of the lag: that of the residuals over what only a lag does to the forces."""
-    others, lag = jacobian[:, :-1], jacobian[:, -1]
-    scale = np.maximum(np.linalg.norm(others, axis=0), 1e-12)
-    mimicked, *_ = np.linalg.lstsq(others / scale, lag, rcond=1e-9)
-    alone = float(np.linalg.norm(lag - others / scale @ mimicked))
-    error = math.hypot(float(np.sqrt(np.mean(residuals**2))), LEAST_ERROR)
-    return LAG_UNIT_S * error / max(alone, 1e-12)
 
 
 def relative(errors: Floats, peak_n: float) -> Floats:

@@ -121,4 +121,4 @@ class ForwardModel:
         self, squeeze: Squeeze, law: CandidateLaw, values: Values, width_m: float, factor: float
     ) -> Floats:
         """Return the force (N) at the samples of a squeeze; NaN where the law has none."""
-        return squeeze.at_samples(self.at_nodes(squeeze, law, values, width_m, factor))
+        return self.at_nodes(squeeze, law, values, width_m, factor)[squeeze.sample]

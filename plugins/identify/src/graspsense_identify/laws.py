@@ -143,15 +143,11 @@ class CandidateLaw:
         """Return combinations of the values to start from."""
         return list(product(*(parameter.starts for parameter in self.free)))[:MAX_STARTS]
 
-    def starting_at(self, values: Mapping[str, float]) -> CandidateLaw:
-        """Return the candidate that starts at these values, by label, where it has the parameter."""
-        free = tuple(
-            evolve(parameter, starts=(min(max(values[parameter.label], parameter.low), parameter.high),))
-            if parameter.label in values
-            else parameter
-            for parameter in self.free
-        )
-        return evolve(self, free=free, more_starts=())
+    def starting_at(self, values: Values) -> CandidateLaw:
+        """Return the candidate whose first parameters start at these values."""
+        begun = zip(self.free, values, strict=False)
+        free = tuple(evolve(parameter, starts=(float(value),)) for parameter, value in begun)
+        return evolve(self, free=free + self.free[len(free) :], more_starts=())
 
 
 TERMS: Final = tuple(find_term(kind)[1] for kind in SLOTS)
@@ -201,8 +197,9 @@ def static_candidates(scale: DataScale) -> list[CandidateLaw]:
 def memories(scale: DataScale) -> list[CandidateLaw]:
     """Return the terms with a memory that a candidate may have beside the others, the simplest first."""
     k = scale.force_n / scale.depth_m
-    shortest, longest = 0.3 * scale.sample_s, 5.0 * scale.memory_s
-    times_s = [min(max(part * scale.memory_s, 1.5 * shortest), 0.5 * longest) for part in (0.2, 0.03)]
+    # A branch that relaxes between two measurements is a damper.
+    shortest, longest = 0.6 * scale.sample_s, 5.0 * scale.memory_s
+    times_s = [min(max(part * scale.memory_s, shortest), 0.5 * longest) for part in (0.2, 0.03)]
     stiffness = _free(MAXWELL, "k_n_m", k, (1e-3, 100.0), 0.3, 0.6)
     branch = CandidateLaw(free=(stiffness, _free(MAXWELL, "tau_s", 1.0, (shortest, longest), *times_s)))
     damping = _free(LOSS, "damping_n_s_m", scale.force_n / scale.speed_m_s, (1e-4, 10.0), 0.1)

@@ -84,8 +84,6 @@ class Squeeze:
     """Nodes at which the force was measured."""
     force_n: Floats
     """The force at these nodes: the mean of both pads."""
-    averaged_s2: Floats
-    """Variance of the times of the measurements of which each of these forces is the mean; 0 for a single one."""
     width_m: float
     """The gap at contact, as a first estimate."""
     stretches: Stretches
@@ -106,12 +104,7 @@ class Squeeze:
 
     def only(self, is_kept: NDArray[np.bool_]) -> Squeeze:
         """Return the squeeze with some of its samples."""
-        return evolve(
-            self,
-            sample=self.sample[is_kept],
-            force_n=self.force_n[is_kept],
-            averaged_s2=self.averaged_s2[is_kept],
-        )
+        return evolve(self, sample=self.sample[is_kept], force_n=self.force_n[is_kept])
 
     @cached_property
     def speed_m_s(self) -> Floats:
@@ -122,28 +115,6 @@ class Squeeze:
     def step_s(self) -> Floats:
         """The time since the node before."""
         return np.diff(self.t_s, prepend=self.t_s[0] - BEFORE_S)
-
-    @cached_property
-    def averaging(self) -> tuple[Floats, Floats]:
-        """Weights of the node before and of the node after each sample in the mean over the times of the sample.
-
-        The mean of a force f over times of variance v is f + v f'' / 2, and f'' follows from the three nodes.
-        """
-        inner = (self.sample > 0) & (self.sample < len(self.t_s) - 1)
-        centre = np.clip(self.sample, 1, len(self.t_s) - 2)
-        before_s, after_s = self.t_s[centre] - self.t_s[centre - 1], self.t_s[centre + 1] - self.t_s[centre]
-        share = np.where(inner, self.averaged_s2 / (before_s + after_s), 0.0)
-        return share / before_s, share / after_s
-
-    def at_samples(self, forces: Floats) -> Floats:
-        """Return the mean force over the times of each sample, from forces at the nodes, in the last axis."""
-        last = len(self.t_s) - 1
-        here = forces[..., self.sample]
-        previous = forces[..., np.maximum(self.sample - 1, 0)]
-        after = forces[..., np.minimum(self.sample + 1, last)]
-        weight_before, weight_after = self.averaging
-        mean: Floats = here + weight_before * (previous - here) + weight_after * (after - here)
-        return mean
 
     @cached_property
     def loading(self) -> slice:
@@ -209,7 +180,7 @@ def prepared(
     touched = int(np.searchsorted(np.flatnonzero(window), onset))
     share = min(MANY / squeezes, 1.0)
     samples, pieces = max(int(share * MAX_SAMPLES), LEAST_SAMPLES), max(int(share * MAX_NODES), LEAST_NODES)
-    times, forces, averaged_s2 = _in_blocks(times[window], forces[window], touched, progress, samples)
+    times, forces = _in_blocks(times[window], forces[window], touched, progress, samples)
     nodes, sample = _nodes(np.append(times, after), progress, pieces)
     sample = sample[: len(times)]
     gap = np.interp(nodes, *course)
@@ -222,7 +193,6 @@ def prepared(
         gap_m=gap,
         sample=sample,
         force_n=forces,
-        averaged_s2=averaged_s2,
         broken_n=broken_n,
         course=course,
         width_m=width,
@@ -238,7 +208,7 @@ def _contact(name: str, forces: Floats, peak: float) -> tuple[float, NDArray[np.
     noise = float(np.std(forces[: max(onset - 2, 0)])) if onset > 6 else 0.0
     if onset <= 6 and len(forces) > MIN_SAMPLES:
         # Noise beyond the share of the peak is no contact, and hides where the recording begins.
-        noise = BENT * float(np.median(np.abs(np.diff(forces, 2))))
+        noise = _noise(forces)
     threshold = max(CONTACT_SHARE * peak, NOISE_FACTOR * noise)
     touching = np.flatnonzero(forces > threshold)
     if peak <= NOISE_FACTOR * scatter or not len(touching):
@@ -249,6 +219,11 @@ def _contact(name: str, forces: Floats, peak: float) -> tuple[float, NDArray[np.
             "needed: squeeze more slowly, or measure at a higher rate"
         )
     return threshold, touching
+
+
+def _noise(forces: Floats) -> float:
+    """Return the standard deviation of the noise of these forces."""
+    return BENT * float(np.median(np.abs(np.diff(forces, 2))))
 
 
 def _samples(name: str, trace: Trace, delay_s: float, lag_s: float) -> tuple[Floats, Floats]:
@@ -273,10 +248,14 @@ def _samples(name: str, trace: Trace, delay_s: float, lag_s: float) -> tuple[Flo
 
 
 def _pad_difference(trace: Trace, begin_s: float, end_s: float) -> float:
-    """Return the largest difference (N) of the forces on both pads between two times; 0 if one pad has none."""
-    within = (trace.t_s >= begin_s) & (trace.t_s <= end_s)
-    apart = np.abs(trace.force_left_n - trace.force_right_n)[within]
-    return float(np.max(apart[np.isfinite(apart)], initial=0.0))
+    """Return the largest difference (N) of the forces on both pads between two times; 0 if one pad has none.
+
+    It is that of means over a twentieth of the time, in which noise is none.
+    """
+    apart = (trace.force_left_n - trace.force_right_n)[(trace.t_s >= begin_s) & (trace.t_s <= end_s)]
+    apart = apart[np.isfinite(apart)]
+    width = 2 * (len(apart) // 40) + 1
+    return float(np.max(np.abs(_moving_mean(apart, width)), initial=0.0)) if len(apart) else 0.0
 
 
 def _progress(course: tuple[Floats, Floats], begin_s: float, end_s: float) -> tuple[Floats, Floats]:
@@ -305,12 +284,13 @@ def _end(trace: Trace, times: Floats, forces: Floats, onset: int, last: int) -> 
     gap = np.interp(times, trace.t_s, trace.gap_m)
     depth = float(gap[onset]) - float(np.min(gap[onset : last + 1]))
     loaded = BREAK_SHARE * float(np.max(forces[onset : last + 1]))
+    noise = _noise(forces)
     for i in range(onset + MIN_SAMPLES, last + 1):
         begin = min(int(np.searchsorted(times, times[i] - BREAK_S)), i - 1)
         peak = begin + int(np.argmax(forces[begin:i]))
         within = gap[peak] - gap[i] <= BREAK_TRAVEL * depth or i == peak + 1
         within = within and gap[i] - gap[peak] <= OPENED_SHARE * depth
-        falls = forces[i] < (1.0 - BREAK_SHARE) * forces[peak]
+        falls = forces[peak] - forces[i] > max(BREAK_SHARE * forces[peak], NOISE_FACTOR * noise)
         if falls and within and forces[peak] > loaded and peak >= onset + MIN_SAMPLES:
             return peak, i
     return last, None
@@ -318,22 +298,19 @@ def _end(trace: Trace, times: Floats, forces: Floats, onset: int, last: int) -> 
 
 def _in_blocks(
     times: Floats, values: Floats, touched: int, progress: tuple[Floats, Floats], samples: int
-) -> tuple[Floats, Floats, Floats]:
-    """Return times and values of about this number of means of neighbouring samples, which are evenly spaced in the
-    progress, and the variance of the times of each.
+) -> tuple[Floats, Floats]:
+    """Return times and values of about this number of means of neighbouring samples, evenly spaced in the progress.
 
     Those beside the contact, at the sample `touched`, stay single: the force of a damper jumps there, and the mean over
     a jump would be compared with that of a smooth course.
     """
     if len(times) <= samples:
-        return times, values, np.zeros(len(times))
+        return times, values
     block = np.minimum(np.interp(times, *progress) * samples, samples - 1).astype(np.int64)
     beside = np.abs(block - block[touched]) <= 1
     edges = np.flatnonzero(beside | (np.diff(block, prepend=-1) > 0))
     counts = np.diff(edges, append=len(times))
-    mean_s = np.add.reduceat(times, edges) / counts
-    variance_s2 = np.add.reduceat((times - np.repeat(mean_s, counts)) ** 2, edges) / counts
-    return mean_s, np.add.reduceat(values, edges) / counts, variance_s2
+    return np.add.reduceat(times, edges) / counts, np.add.reduceat(values, edges) / counts
 
 
 def _nodes(times: Floats, progress: tuple[Floats, Floats], nodes: int) -> tuple[Floats, NDArray[np.int64]]:

@@ -10,12 +10,15 @@ import numpy as np
 
 from graspsense.simulator_api import SqueezeFit, Undetermined, repeatability
 from graspsense_identify.fit import Fitted
-from graspsense_identify.held_out import CONFIRMS
 from graspsense_identify.laws import MAXWELL, SNAP
+from graspsense_identify.parts import LEAST_INSTANCES
 from graspsense_identify.prepare import BREAK_SHARE, Squeeze
 from graspsense_identify.share import Shares
-from graspsense_identify.spread import LEAST_INSTANCES, Uncertainty
+from graspsense_identify.spread import Uncertainty
 
+CONFIRMS: Final = 0.1
+"""A held-out squeeze that is predicted to this share of its peak confirms the object, and so does one that is predicted
+as closely as the squeezes are alike (`repeatability`)."""
 LEAST_HOLD_S: Final = 0.2
 """A shorter hold shows no relaxation."""
 SPEED_RATIO: Final = 2.0
@@ -25,6 +28,10 @@ WIDE: Final = 4.0
 HOLD_TIMES: Final = 5.0
 """A hold of this many relaxation times determines one."""
 
+PADS_DIFFER: Final = 0.2
+"""Share of the largest force by which the forces on both pads may differ."""
+ONE_KIND: Final = math.log(1.5)
+"""Standard deviation of the logarithm of the stiffness from which on objects hardly are of one kind."""
 FALL_SHARE: Final = 0.25
 """A fall of the force by this share of the peak between two samples needs a term of its own."""
 
@@ -57,6 +64,15 @@ def undetermined(fitted: Fitted, intervals: Uncertainty, shares: Shares) -> Iter
             what="relaxation (maxwell, loss)",
             reason=f"a ramp only, of {load_s:.2g} s at one speed, shows no relaxation time",
             remedy="hold for 5 s, or squeeze at two speeds that differ by a factor of two or more",
+        )
+    apart = max(squeeze.pad_difference for squeeze in squeezes)
+    if apart > PADS_DIFFER:
+        yield Undetermined(
+            what="the force on the object",
+            reason=f"those on the two pads differ by up to {100 * apart:.0f} % of the largest one: a pad is dead or "
+            "has another scale, or one finger touches an object that is fixed off the centre before the other",
+            remedy="look at the pads, and centre the object, or let it stand free",
+            in_scene=True,
         )
     yield from _parameters(fitted, intervals)
     yield from _falls(fitted)
@@ -148,6 +164,16 @@ def _spreads(uncertainty: Uncertainty, squeezes: Sequence[Squeeze]) -> Iterator[
             what="spread between objects",
             reason=f"the recordings are of {objects}",
             remedy=f"record {LEAST_INSTANCES} objects or more, labelled cup#1, cup#2, cup#3",
+        )
+    depth_m = float(np.median([squeeze.depth_m for squeeze in squeezes]))
+    if uncertainty.stiffness.whole > ONE_KIND or uncertainty.width_m.whole > depth_m:
+        yield Undetermined(
+            what="whether the recordings are of one kind of object, in one unit",
+            reason=f"from squeeze to squeeze the stiffness differs by a factor of "
+            f"{math.exp(uncertainty.stiffness.whole):.2g} (one standard deviation), and the width by "
+            f"{1e3 * uncertainty.width_m.whole:.2g} mm",
+            remedy="identify objects of different kinds apart, and compare the units of the recordings",
+            in_scene=True,
         )
     if len(squeezes) == 1:
         yield Undetermined(

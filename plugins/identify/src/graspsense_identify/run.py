@@ -15,16 +15,17 @@ from attrs import evolve, fields_dict
 from graspsense.plugin_api import ConfigError
 from graspsense.simulator_api import Identification, IdentifiedParameter, RecordedSqueeze, SqueezeFit
 from graspsense_identify.block import lag_of_block, with_fingertips_of_block
+from graspsense_identify.checks import predictive_checks
 from graspsense_identify.choose import choose
-from graspsense_identify.delay import Delay, Lag, Timed, delay_of, lag_of, with_delay
+from graspsense_identify.delay import PATH_ERROR_S, Delay, Timed, delay_of, lag_of, with_delay
 from graspsense_identify.fit import Fitted
 from graspsense_identify.forward import ForwardModel, path_forces
 from graspsense_identify.fracture import explained_falls, fracture_of, not_broken, of_whole_objects
-from graspsense_identify.held_out import held_out_errors, predictive_checks
 from graspsense_identify.interval import identified, identified_mean
 from graspsense_identify.laws import scale_of
+from graspsense_identify.parts import parts_of
 from graspsense_identify.prepare import NoSqueeze, Squeeze, prepared
-from graspsense_identify.refuse import refusals, shows_memory, undetermined
+from graspsense_identify.refuse import PADS_DIFFER, refusals, shows_memory, undetermined
 from graspsense_identify.share import WHOLE, Shares, measured_shares
 from graspsense_identify.spread import Uncertainty, uncertainty
 from graspsense_identify.write import scene_text
@@ -32,8 +33,6 @@ from graspsense_sim_gripper.run.identification import CELLS, SimConfig, drive_an
 
 Progress = Callable[[str, int, int], None]
 
-PADS_DIFFER: Final = 0.2
-"""Share of the largest force by which the forces on both pads may differ without a note."""
 WEAK_N: Final = 0.1
 """A largest force below this one is more likely in another unit than that of so weak a squeeze."""
 MAX_SQUEEZES: Final = 30
@@ -65,24 +64,27 @@ def identify(
     recorded = _used(_distinct(squeezes, notes), notes)
     notes += _looks_wrong(recorded)
 
-    def timed(lag: Lag) -> Timed:
-        used, said = _timed(config, model, recorded, lag, progress)
-        notes.extend(() if lag.lag_s else said)
+    def timed(lag_s: float) -> Timed:
+        used, said = _timed(config, model, recorded, lag_s, progress)
+        notes.extend(() if lag_s else said)
         return used
 
     def shown(used: Timed) -> Delay:
-        return delay_of(used.choice.fitted, config.force_delay_s, used.lag)
+        return delay_of(used.choice.fitted, config.force_delay_s, used.lag_s)
 
     used, delay = with_delay(timed, lag_of, shown)
     progress("computing intervals", 0, 1)
     chosen, shares = used.choice, used.shares
-    fitted, intervals = chosen.fitted, _uncertainty(used, delay)
+    fitted = chosen.fitted
+    lag_error_s = math.hypot(PATH_ERROR_S if used.lag_s else 0.0, delay.error_s)
+    parts = parts_of(fitted, has_lag=lag_error_s > 0.0)
+    intervals = uncertainty(fitted, parts, shares.error / math.sqrt(len(fitted.squeezes)), lag_error_s)
     fracture = fracture_of(fitted, shares.scatter)
     values, parameters = _values(fitted, intervals, shares)
     parameters += delay.parameters
     parameters += fracture.parameters
     open_ = [*delay.undetermined, *undetermined(fitted, intervals, shares), *fracture.undetermined]
-    fits, held_out = _fits(fitted), held_out_errors(fitted)
+    fits, held_out = _fits(fitted), parts.squeeze_errors
     result = Identification(
         label=next((squeeze.label for squeeze in recorded if squeeze.label), ""),
         scene="",
@@ -104,7 +106,7 @@ def _timed(
     config: SimConfig,
     model: ForwardModel,
     recorded: Sequence[RecordedSqueeze],
-    lag: Lag,
+    lag_s: float,
     progress: Progress,
 ) -> tuple[Timed, list[str]]:
     """Return the choice for squeezes whose force lags like this, and notes on them.
@@ -115,13 +117,13 @@ def _timed(
     whole, has_cells = set[str](), _has_cells(config, recorded)
     while True:
         notes: list[str] = []
-        ready, shares = _ready(config, recorded, notes, has_cells, lag.lag_s, whole)
+        ready, shares = _ready(config, recorded, notes, has_cells, lag_s, whole)
         choice = choose(
             model, ready, scale_of(ready), shows_memory(ready), partial(progress, "fitting candidates")
         )
         explained = explained_falls(choice.fitted)
         if not explained:
-            return Timed(shares, choice, lag), notes
+            return Timed(shares, choice, lag_s), notes
         whole |= explained
 
 
@@ -152,13 +154,6 @@ def _looks_wrong(squeezes: Sequence[RecordedSqueeze]) -> list[str]:
     return wrong
 
 
-def _uncertainty(used: Timed, delay: Delay) -> Uncertainty:
-    """Return the uncertainty of the chosen fit."""
-    fitted = used.choice.fitted
-    scale = used.shares.error / math.sqrt(len(fitted.squeezes))
-    return uncertainty(fitted, scale, math.hypot(used.lag.error_s, delay.error_s))
-
-
 def _ready(
     config: SimConfig,
     squeezes: Sequence[RecordedSqueeze],
@@ -181,6 +176,14 @@ def _ready(
             ready[i] = prepare(squeeze, may_break=squeeze.name not in whole)
         except NoSqueeze as refusal:
             refused.append(refusal)
+    alike = {i: squeeze for i, squeeze in ready.items() if squeeze.pad_difference <= PADS_DIFFER}
+    if alike:
+        refused += [
+            NoSqueeze(f"{squeeze.name}: the forces on its pads differ, and those of other recordings do not")
+            for i, squeeze in ready.items()
+            if i not in alike
+        ]
+        ready = alike
     if not ready:
         raise NoSqueeze("\n  ".join((str(refused[0]), *_looks_wrong(squeezes))))
     kept = list(ready)
@@ -195,13 +198,6 @@ def _ready(
     ready = {kept[k]: squeeze for k, squeeze in unbroken.items()}
     kept = list(ready)
     notes += [f"left out: {refusal}" for refusal in refused]
-    apart = max(squeeze.pad_difference for squeeze in ready.values())
-    if apart > PADS_DIFFER:
-        notes.append(
-            f"the forces on the two pads differ by up to {100 * apart:.0f} % of the largest force. If the object is "
-            "fixed off the centre, one finger touches it before the other, and the chosen terms are wrong: centre it, "
-            "or let it stand free"
-        )
     shares = WHOLE
     if has_cells:
         shares = measured_shares(config, [squeezes[i].trace for i in kept], list(ready.values()))

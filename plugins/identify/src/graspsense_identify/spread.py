@@ -1,17 +1,13 @@
-"""Uncertainty: from squeeze to squeeze and from object to object by leaving them out in turn, within one by bootstrap.
+"""Uncertainty: from squeeze to squeeze and from object to object, by leaving parts out in turn.
 
-With two or more squeezes the interval is that of the delete-a-group jackknife (Shao and Tu, The Jackknife and
-Bootstrap, 1995, section 2.3) with Student's t, on the logarithms. A group is an object if there are three of them,
-otherwise a squeeze. The scatter between groups is usually many times the standard deviation that one fit gives itself.
-One squeeze shows no such scatter: blocks of its residuals are drawn again. No interval is smaller than that of the
-linearised fit.
+The interval is that of the jackknife of the logarithms. The scatter between squeezes is usually many times the standard
+deviation that one fit gives itself. No interval is smaller than that of the linearised fit.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import chain
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -19,17 +15,12 @@ from attrs import evolve, frozen
 from numpy.typing import NDArray
 
 from graspsense_identify.corners import corner_errors
-from graspsense_identify.fit import Fitted, in_threads, linear_covariance
-from graspsense_identify.interval import normal, student
-from graspsense_identify.prepare import Squeeze
+from graspsense_identify.fit import Fitted, linear_covariance
+from graspsense_identify.interval import normal
+from graspsense_identify.parts import LEAST_INSTANCES, Parts
 
 Floats = NDArray[np.float64]
 
-MAX_GROUPS: Final = 10
-LEAST_INSTANCES: Final = 3
-BOOTSTRAPS: Final = 24
-BLOCKS: Final = 12
-"""Blocks of neighbouring residuals of a squeeze, which are drawn again together."""
 DRAWS: Final = 200
 LARGEST: Final = math.log(30.0)
 """A logarithm changes by at most this in proportion to the force. A larger change is one of a value near zero."""
@@ -73,7 +64,9 @@ class Uncertainty:
     width_m: Components
 
 
-def uncertainty(fitted: Fitted, force_scale: float = 0.0, lag_error_s: float = 0.0) -> Uncertainty:
+def uncertainty(
+    fitted: Fitted, parts: Parts, force_scale: float = 0.0, lag_error_s: float = 0.0
+) -> Uncertainty:
     """Return the uncertainty of a fit.
 
     `force_scale`: standard deviation of the logarithm of the force's scale. `lag_error_s`: that of the lag of the force
@@ -81,17 +74,18 @@ def uncertainty(fitted: Fitted, force_scale: float = 0.0, lag_error_s: float = 0
     """
     rng = np.random.default_rng(0)
     names = [squeeze.instance for squeeze in fitted.squeezes]
-    again = refits(fitted, rng, has_lag=lag_error_s > 0.0)
-    table = np.log([refit.values for refit in again.fits])
-    deviations = table - table.mean(axis=0)
-    factor, basis = again.factor, again.basis
+    factor = parts.factor
+    scattered = parts.covariance(np.log([part.fitted.values for part in parts.parts]))
     linear = linear_covariance(fitted, PATH_FORCE_ERROR)
-    covariance = at_least(again.scale * deviations.T @ deviations, linear * (normal() / factor) ** 2)
-    own = _scale_errors(fitted, force_scale) + PATH_ERROR**2 * np.eye(len(fitted.values))
+    covariance = at_least(scattered, linear * (normal() / factor) ** 2)
+    # An error of the scale of the force is common to all squeezes, so that none of them shows it.
+    scaled = force_scale * np.array([parameter.is_force for parameter in fitted.candidate.free])
+    own = np.outer(scaled, scaled) + PATH_ERROR**2 * np.eye(len(fitted.values))
     own += np.diag(corner_errors(fitted) ** 2)
     if lag_error_s > 0.0:
         later = [squeeze.delayed(lag_error_s) for squeeze in fitted.squeezes]
-        own += _of_shift(fitted, evolve(fitted, squeezes=later))
+        shift = np.log(evolve(fitted, squeezes=later).refitted().values) - np.log(fitted.values)
+        own += np.outer(shift, shift)
     covariance = covariance + own * (normal() / factor) ** 2
     spread = np.sqrt(np.diag(covariance))
     best = np.array(fitted.values)
@@ -103,7 +97,7 @@ def uncertainty(fitted: Fitted, force_scale: float = 0.0, lag_error_s: float = 0
     return Uncertainty(
         low=tuple(low.tolist()),
         high=tuple(high.tolist()),
-        basis=basis,
+        basis=parts.basis,
         draws=best * _changed(factor / normal() * drawn),
         stiffness=_components(np.log(fitted.factors), names),
         width_m=_components(np.array(fitted.widths_m), names),
@@ -129,92 +123,6 @@ def at_least(covariance: Floats, other: Floats) -> Floats:
     own = np.sqrt(np.maximum(np.diag(covariance), np.diag(other)))
     ratio = own / np.sqrt(np.diag(both))
     return both * np.outer(ratio, ratio)
-
-
-def _of_shift(fitted: Fitted, shifted: Fitted) -> Floats:
-    """Return the covariance of the logarithms of an error whose standard deviation leads to other squeezes or laws.
-
-    `shifted`: where the fit to these starts.
-    """
-    shift = np.log(shifted.refitted().values) - np.log(fitted.values)
-    return np.outer(shift, shift)
-
-
-def _scale_errors(fitted: Fitted, force_scale: float) -> Floats:
-    """Return the covariance of the logarithms that an error of the scale of the force causes.
-
-    It is common to all squeezes, so that none of them shows it. Through compliant fingertips, it changes lengths, too.
-    """
-    if force_scale == 0.0:
-        return np.zeros((len(fitted.values), len(fitted.values)))
-    more = math.exp(force_scale)
-    stronger = [evolve(squeeze, force_n=more * squeeze.force_n) for squeeze in fitted.squeezes]
-    scaled = [
-        value * more if parameter.is_force else value
-        for parameter, value in zip(fitted.candidate.free, fitted.values, strict=True)
-    ]
-    return _of_shift(fitted, evolve(fitted, values=tuple(scaled), squeezes=stronger))
-
-
-class Refits(NamedTuple):
-    """Fits to parts of the data, or to data drawn again, and how their scatter gives an interval."""
-
-    fits: Sequence[Fitted]
-    scale: float
-    """The variance of the fit over the sum of their squared deviations."""
-    factor: float
-    """Half the width of the interval, in standard deviations."""
-    basis: str
-
-
-def refits(fitted: Fitted, rng: np.random.Generator, *, has_lag: bool) -> Refits:
-    """Return the fits without each group of squeezes in turn, or to a single squeeze with residuals drawn again."""
-    squeezes = fitted.squeezes
-    groups = _groups(squeezes)
-    if len(groups) < 2:
-        # The fit follows a part of the residuals' own errors, with as many directions as it has parameters.
-        degrees = max(BLOCKS - len(fitted.values) - int(has_lag) - 1, 1)
-        fits = _bootstrapped(fitted, rng, has_lag=has_lag)
-        scale = BLOCKS / degrees / (BOOTSTRAPS - 1)
-        return Refits(fits, scale, student(degrees), "within one squeeze; not between squeezes")
-    kept = [fitted.part([i for i in range(len(squeezes)) if i not in group]) for group in groups]
-    fits = in_threads(lambda part: part.refitted(has_lag=has_lag), kept)
-    g = len(groups)
-    what = "objects" if has_objects(squeezes) else "squeezes"
-    basis = f"between {g} {what if g == len(groups) else 'groups'}"
-    return Refits(fits, (g - 1) / g, student(g - 1), basis)
-
-
-def has_objects(squeezes: Sequence[Squeeze]) -> bool:
-    """Return whether every squeeze is of an object with a number, and there are at least three of these."""
-    names = {squeeze.instance for squeeze in squeezes}
-    return "" not in names and len(names) >= LEAST_INSTANCES
-
-
-def _groups(squeezes: Sequence[Squeeze]) -> list[list[int]]:
-    """Return the squeezes that are left out together: those of an object, or each alone."""
-    if has_objects(squeezes):
-        names = sorted({squeeze.instance for squeeze in squeezes})
-        groups = [[i for i, squeeze in enumerate(squeezes) if squeeze.instance == name] for name in names]
-    else:
-        groups = [[i] for i in range(len(squeezes))]
-    if len(groups) > MAX_GROUPS:
-        groups = [list(chain.from_iterable(groups[k::MAX_GROUPS])) for k in range(MAX_GROUPS)]
-    return groups
-
-
-def _bootstrapped(fitted: Fitted, rng: np.random.Generator, *, has_lag: bool) -> list[Fitted]:
-    """Return refits to the fitted force of a single squeeze with blocks of residuals drawn again."""
-    (squeeze,), (clean,) = fitted.squeezes, fitted.forces()
-    residuals = clean - squeeze.force_n
-    length = max(len(residuals) // BLOCKS, 1)
-    drawn_again = []
-    for _ in range(BOOTSTRAPS):
-        starts = rng.integers(0, max(len(residuals) - length, 1), size=-(-len(residuals) // length))
-        drawn = np.concatenate([residuals[s : s + length] for s in starts])[: len(residuals)]
-        forces = clean - drawn * rng.choice((-1.0, 1.0))
-        drawn_again.append(evolve(fitted, squeezes=[evolve(squeeze, force_n=forces)]))
-    return in_threads(lambda start: start.refitted(has_lag=has_lag), drawn_again)
 
 
 def _components(values: Floats, names: Sequence[str]) -> Components:

@@ -230,6 +230,7 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
             if isinstance(self._cells, SpringCells)
             else ForceGauge(model, data, fingers, things, travel.axis)
         )
+        self._most_n = self._forces.most_n if isinstance(self._forces, ForceGauge) else inf
         self._sensors, self._edges = (
             [int(model.sensor_adr[identifier(model, "sensor", name)]) for name in names]
             for names in (
@@ -340,7 +341,7 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         self._measured_m = measured_m
         left, right = self._forces.forces_n()
         self._greatest_n = max(self._greatest_n, left, right)
-        if data.ncon and self._greatest_n < TOUCH_N:
+        if data.ncon and not TOUCH_N <= self._greatest_n < self._most_n:
             self._check_felt()
         t_s = self._ticks * tick_s
         if self._motion.moves:
@@ -373,7 +374,12 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         return Reading(frame, pads, signals)
 
     def _check_felt(self) -> None:
-        """Raise DeviceLost where the thing is squeezed, and no finger feels it."""
+        """Raise DeviceLost where the thing is squeezed, and no finger feels it, or not all of it."""
+        if self._greatest_n >= self._most_n:
+            raise DeviceLost(
+                f"a finger feels {self._greatest_n:.3g} N, and a sensor has a cutoff of {self._most_n:.3g} N "
+                "in the model. Raise it, or grasp with less force"
+            )
         squeeze_n = self._forces.squeeze_n() if isinstance(self._forces, ForceGauge) else 0.0
         if squeeze_n > UNFELT_N:
             raise DeviceLost(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Set
-from math import hypot
+from math import hypot, inf
 from typing import Any
 
 import mujoco
@@ -81,6 +81,16 @@ class ForceGauge:
                 self._roles[geom] |= role
         self._sensors = [self._sensor(finger, side) for finger, side in zip(fingers, SIDES, strict=True)]
         self._by_contacts = None in self._sensors
+        numbers = [identifier(model, "sensor", finger.sensor) for finger in fingers if finger.sensor]
+        bodies = {int(model.site_bodyid[model.sensor_objid[number]]) for number in numbers}
+        if len(bodies) < len(numbers):
+            raise ConfigError(
+                f"gripper.file: the sensors {fingers[0].sensor!r} and {fingers[1].sensor!r} are on the same body, "
+                "and each finger needs its own"
+            )
+        cutoffs = [float(model.sensor_cutoff[number]) for number in numbers]
+        self.most_n = min((cutoff for cutoff in cutoffs if cutoff > 0.0), default=inf)
+        """From this force on, a sensor of the model shows no larger one."""
         self._factors: dict[tuple[int, int], tuple[float, float]] = {}
         self._wrench = np.zeros(6)
         self._force = plain(self._wrench)

@@ -40,6 +40,8 @@ NEEDED: Final = (
     mujoco.mjtDisableBit.mjDSBL_CONTACT
     | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
     | mujoco.mjtDisableBit.mjDSBL_SENSOR
+    | mujoco.mjtDisableBit.mjDSBL_EQUALITY
+    | mujoco.mjtDisableBit.mjDSBL_ACTUATION
 )
 """What a model may switch off to be looked at, and a grasp needs."""
 POINT: Final = "graspsense/"
