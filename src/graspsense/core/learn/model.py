@@ -12,8 +12,9 @@ from attrs import evolve, frozen
 
 from graspsense.core.components.entries import TABLE_OF_ROLE
 from graspsense.core.components.setting import CHANGES_NO_RESULT, NAMES_INPUT, settings_marked, worded
-from graspsense.core.learn.certainty import LABEL_UNITS, Certainty, with_certainty
-from graspsense.core.learn.conformal import Answers, PredictionSets, scores_of
+from graspsense.core.learn.answers import answers_of
+from graspsense.core.learn.certainty import LABEL_UNITS, Certainty
+from graspsense.core.learn.conformal import PredictionSets
 from graspsense.core.learn.novelty import REACH, Novelty
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.core.values.features import (
@@ -184,8 +185,9 @@ class Model:
         """
         classes = self.classifier.classes()
         known = np.array([label != UNKNOWN for label in labels])
-        predicted = shares.argmax(axis=1)
-        predicted[known] = [classes.index(label) for label in labels if label != UNKNOWN]
+        columns = shares.argmax(axis=1)
+        columns[known] = [classes.index(label) for label in labels if label != UNKNOWN]
+        answers = answers_of(self.novelty, table, classes, shares, columns, self.support(table))
         no_certainty = "it was not measured under these settings" if elsewhere else self.no_certainty
         unmeasured = self.novelty.unmeasured(
             table, math.inf if self.certainty is None else self.certainty.reach
@@ -193,34 +195,22 @@ class Model:
         probabilities, members = shares, np.zeros(shares.shape, dtype=np.bool_)
         intervals: Sequence[tuple[float, float] | None] = [None] * len(table)
         if self.certainty is not None and not no_certainty:
-            support = self.support(table)
-            share = shares[np.arange(len(table)), predicted]
-            answered = [classes[k] for k in predicted.tolist()]
-            certainty = self.certainty.rate(share, support, answered)
-            kept = self.certainty.intervals(share, support, answered)
             measured = np.array([not why for why in unmeasured])
             known &= measured
-            calibrated = with_certainty(shares, predicted, certainty)
+            calibrated = self.certainty.probabilities(answers)
             probabilities = np.where(measured[:, np.newaxis], calibrated, shares)
             # No answer counts as less certain than chance, however seldom such answers were right.
-            own = calibrated[np.arange(len(table)), predicted].tolist()
+            own = calibrated[np.arange(len(table)), columns].tolist()
             intervals = [
                 interval and (min(interval[0], sure), max(interval[1], sure))
-                for interval, sure in zip(kept, own, strict=True)
+                for interval, sure in zip(self.certainty.intervals(answers), own, strict=True)
             ]
             if self.sets is not None and self.sets.thresholds:
-                scores = scores_of(shares, self.novelty.closeness(table, classes))
-                answers = Answers(
-                    scores=scores,
-                    predicted=predicted,
-                    certainty=certainty,
-                    support_class=self.certainty.class_of(support),
-                )
-                members[known] = self.sets.members(answers, classes)[known]
+                members[known] = self.sets.members(answers.rows(known), self.certainty)
         made = []
-        for i, label in enumerate(labels):
-            order = sorted(np.flatnonzero(members[i]), key=lambda k: (k != predicted[i], -scores[i, k]))
-            without = no_certainty or unmeasured[i] or self._why_uncertain(classes[predicted[i]])
+        for i, (label, nearest) in enumerate(zip(labels, answers.predicted, strict=True)):
+            order = sorted(np.flatnonzero(members[i]), key=lambda k: (k != columns[i], -answers.scores[i, k]))
+            without = no_certainty or unmeasured[i] or self._why_uncertain(nearest)
             made.append(
                 Prediction(
                     label=label,
