@@ -196,7 +196,9 @@ def test_what_a_label_lacks_for_sets_is_counted_in_instances_where_each_label_ha
     two = {("full", "full#1"): 20, ("full", "full#2"): 1, ("empty", "empty#1"): 5, ("empty", "empty#2"): 5}
 
     assert units_lacking(two) == ("instances", {"empty": 7, "full": 7})
-    assert units_lacking({**two, ("jar", "jar#1"): 4}) == ("trials", {"empty": 0, "full": 0, "jar": 5})
+    assert units_lacking({**two, ("jar", "jar#1"): 4}) == ("instances", {"empty": 7, "full": 7, "jar": 8})
+    single = {("jar", "jar#1"): 4, ("can", "can#1"): 4}
+    assert units_lacking({**two, **single}) == ("trials", {"can": 5, "empty": 0, "full": 0, "jar": 5})
     assert units_lacking({("full", None): 12}, 0.95) == ("trials", {"full": 7})
 
 
@@ -557,6 +559,28 @@ def test_answers_for_one_object_count_for_more_than_one_where_the_objects_hardly
     assert said[0] == pytest.approx(0.88, abs=0.02)
     assert said[1] == pytest.approx(said[2])
     assert said[1] < said[0] - 0.03
+
+
+def test_a_label_with_a_single_object_has_no_certainty_and_others_are_not_too_sure_beside_it():
+    """Objects of a label differ: those of three labels are known by 10 others, of the fourth one only one is."""
+    said, told = [], 0
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        means = rng.normal(size=(4, 4))
+        kinds = np.array([*np.repeat([1, 2, 3], 10), 0])
+        own = np.repeat(means[kinds] + 0.7 * rng.normal(size=(31, 4)), 3, axis=0)
+        names = [f"{k}#{i}" for i, k in enumerate(kinds) for _ in range(3)]
+        values = own + 0.3 * rng.normal(size=own.shape)
+        model = model_of(labelled([name[0] for name in names], *values.T, instances=tuple(names)), "svm")
+        new = rng.integers(0, 4, 200)
+        asked_about = labelled(["?"] * 200, *(means[new] + 0.76 * rng.normal(size=(200, 4))).T)
+        for answer, kind in zip(model.predictions(asked_about.table), new, strict=True):
+            told += answer.label == "0" and answer.certainty is not None
+            if answer.certainty is not None:
+                said.append(answer.certainty - (answer.label == str(kind)))
+    assert told == 0
+    # With single trials held out it would be 10 points.
+    assert np.mean(said) < 0.03
 
 
 def test_an_answer_that_is_seldom_given_has_no_certainty_and_no_set_of_its_own(tmp_path):

@@ -11,7 +11,14 @@ from numpy.typing import NDArray
 
 from graspsense.core.learn.answers import Answers, answers_of
 from graspsense.core.learn.certainty import Certainty, certainty_of
-from graspsense.core.learn.conformal import COVERAGE, PredictionSets, reach_of, sets_of, units_needed
+from graspsense.core.learn.conformal import (
+    COVERAGE,
+    PredictionSets,
+    can_be_held_out,
+    reach_of,
+    sets_of,
+    units_needed,
+)
 from graspsense.core.learn.confounding import confounded
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.learn.model import Model
@@ -129,12 +136,11 @@ def _unit(labelled: Labelled) -> str:
 
 
 def exchangeable_instances(labelled: Labelled) -> tuple[str, ...] | None:
-    """Return the instances of the trials; None if they are not known, or if a label has a single named one."""
+    """Return the instances of the trials; None if they are not known, or named ones cannot be held out."""
     if labelled.instances is None or labelled.grouped:
         return labelled.instances
-    pairs = set(zip(labelled.labels, labelled.instances, strict=True))
-    several = all(sum(label == name for name, _ in pairs) > 1 for label in labelled.classes)
-    return labelled.instances if several else None
+    named = {*zip(labelled.labels, labelled.instances, strict=True)}
+    return labelled.instances if can_be_held_out(named) else None
 
 
 @frozen(kw_only=True, eq=False)
@@ -178,7 +184,10 @@ class HeldOut:
             unit = "trials" if own is None else "instances"
             return f"{count} calibration {unit}, {100 * COVERAGE:.0f} % needs {units_needed()}"
         certainty = certainty_of(answers, answers.right(labels), units, effect_of(answers.folds))
-        certainty = evolve(certainty, reach=reach_of(answers.outside, np.array(units)))
+        # Trials of a label that the model of their fold did not know are rightly outside; only these have no score.
+        known = answers.scores[np.arange(len(labels)), answers.columns_of(labels)] > 0.0
+        if known.any():
+            certainty = evolve(certainty, reach=reach_of(answers.outside[known], np.array(units)[known]))
         return certainty, sets_of(answers, labels, own, certainty)
 
     def members(self) -> NDArray[np.bool_] | str:

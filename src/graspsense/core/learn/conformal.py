@@ -20,7 +20,8 @@ The scores are cross-validated, but the prediction is by the model of all trials
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -63,24 +64,32 @@ def units_lacking(
 ) -> tuple[str, dict[str, int]]:
     """Return the unit of exchangeability, and how many more units each label needs for a threshold of its own.
 
-    `counts` are the trials of each label and instance. The unit is `instances` if every trial has one and every label
-    has several, else `trials`.
+    `counts` are the trials of each label and instance. The unit is `instances` if every trial has one and they can be
+    held out, else `trials`.
 
     >>> units_lacking({("full", "full#1"): 5, ("full", "full#2"): 5})
     ('instances', {'full': 7})
     >>> units_lacking({("full", None): 5})
     ('trials', {'full': 4})
     """
-    named: dict[str, set[str | None]] = {}
-    trials: dict[str, int] = {}
-    for (label, instance), n in counts.items():
-        named.setdefault(label, set()).add(instance)
-        trials[label] = trials.get(label, 0) + n
-    by_instance = all(None not in instances and len(instances) > 1 for instances in named.values())
-    have = {label: len(instances) for label, instances in named.items()} if by_instance else trials
+    trials: Counter[str] = Counter()
+    for (label, _), n in counts.items():
+        trials[label] += n
+    by_instance = can_be_held_out(counts) and all(instance is not None for _, instance in counts)
+    have = Counter(label for label, _ in counts) if by_instance else trials
     needed = units_needed(coverage)
     lacking = {label: max(needed - n, 0) for label, n in sorted(have.items())}
     return ("instances" if by_instance else "trials"), lacking
+
+
+def can_be_held_out(named: Iterable[tuple[str, str | None]]) -> bool:
+    """Return whether whole instances can be held out, of these different pairs of a label and an instance.
+
+    Most labels need several. The only one of a label is held out as well: no model knows the label then, and how often
+    it is recognised is not known.
+    """
+    of_label = Counter(label for label, _ in named)
+    return 2 * sum(instances > 1 for instances in of_label.values()) > len(of_label)
 
 
 @frozen(kw_only=True)
