@@ -380,8 +380,9 @@ def _steps(
     right_in, units = (
         np.asarray(np.bincount(level_of, counts), dtype=np.float64) / effect for counts in (right_of, all_of)
     )
-    rates = (units * _drawn_together(right_in, units, len(all_of), guessing) + 1.0) / (units + 2.0)
-    rates = np.maximum.accumulate(rates)
+    drawn = np.maximum(_drawn_together(right_in, units, len(all_of), guessing), guessing)
+    # Two answers more, one of them right, leave none certain; they make no guess among several labels surer.
+    rates = np.maximum.accumulate(np.minimum((units * drawn + 1.0) / (units + 2.0), drawn))
     ends = (betaincinv(rates * (units + 2.0), (1.0 - rates) * (units + 2.0), end) for end in (0.025, 0.975))
     begins = (edges[number] for number in first_of.tolist())
     return tuple(begins), tuple(rates.tolist()), tuple(zip(*(end.tolist() for end in ends), strict=True))
