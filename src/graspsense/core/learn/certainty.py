@@ -98,6 +98,10 @@ class LabelShare:
     high: float
 
 
+_EVERY_LABEL: Final = LabelShare(share=1.0, low=1.0, high=1.0)
+"""The share where those of single labels are not known."""
+
+
 def _applied(rate: float, share: float) -> float:
     """Return the rate of a label with this share, of that of all labels."""
     return 1.0 - (1.0 - rate) / share if share > 1.0 else rate * share
@@ -129,41 +133,32 @@ class Certainty:
 
     def rate(self, answers: Answers) -> NDArray[np.float64]:
         """Return the rate of right answers that are as likely, with the same label; NaN where it is not known."""
-        steps, shares = self._steps(answers), self._of_labels(answers.predicted)
-        return np.array([_applied(rate, own.share) for (rate, _), own in zip(steps, shares, strict=True)])
+        return self.bounds(answers)[:, 1]
 
-    def intervals(self, answers: Answers) -> list[tuple[float, float] | None]:
-        """Return the 95 % interval of the rate of each answer; None where it was not kept."""
-        return [
-            interval
-            and (
-                min(_applied(interval[0], of_label.share), _applied(rate, of_label.low)),
-                max(_applied(interval[1], of_label.share), _applied(rate, of_label.high)),
-            )
-            for (rate, interval), of_label in zip(
-                self._steps(answers), self._of_labels(answers.predicted), strict=True
-            )
-        ]
+    def bounds(self, answers: Answers) -> NDArray[np.float64]:
+        """Return the rate of each answer between the ends of its 95 % interval, shape (trials, 3).
+
+        All are NaN where the rate is not known, and the ends where they were not kept.
+        """
+        result = np.full((len(answers.columns), 3), np.nan)
+        numbers, shares = self.class_of(answers.support).tolist(), answers.shares.tolist()
+        for i, (k, value, label) in enumerate(zip(numbers, shares, answers.predicted, strict=True)):
+            own = _EVERY_LABEL if self.of_label is None else self.of_label.get(label)
+            if own is None:
+                continue
+            of_class = self.classes[k]
+            step = bisect_right(of_class.probabilities, value + _ROUNDING, lo=1) - 1
+            rate = of_class.rates[step]
+            result[i, 1] = _applied(rate, own.share)
+            if of_class.intervals:
+                low, high = of_class.intervals[step]
+                result[i, 0] = min(_applied(low, own.share), _applied(rate, own.low))
+                result[i, 2] = max(_applied(high, own.share), _applied(rate, own.high))
+        return result
 
     def probabilities(self, answers: Answers) -> NDArray[np.float64]:
         """Return the probabilities of all labels, of which that of the predicted one is its rate."""
         return with_certainty(answers.probabilities, answers.columns, self.rate(answers))
-
-    def _steps(self, answers: Answers) -> list[tuple[float, tuple[float, float] | None]]:
-        """Return the rate of each answer, of all labels together, and its interval, None where it was not kept."""
-        steps = []
-        for k, value in zip(self.class_of(answers.support).tolist(), answers.shares.tolist(), strict=True):
-            of_class = self.classes[k]
-            step = bisect_right(of_class.probabilities, value + _ROUNDING, lo=1) - 1
-            steps.append((of_class.rates[step], of_class.intervals[step] if of_class.intervals else None))
-        return steps
-
-    def _of_labels(self, labels: Sequence[str]) -> list[LabelShare]:
-        """Return the share of each of these labels; NaN for one that was too seldom the answer."""
-        if self.of_label is None:
-            return [LabelShare(share=1.0, low=1.0, high=1.0)] * len(labels)
-        unknown = LabelShare(share=math.nan, low=math.nan, high=math.nan)
-        return [self.of_label.get(label, unknown) for label in labels]
 
     def to_json(self) -> dict[str, Any]:
         """Return its entries in the file of a model, as values that JSON represents exactly."""
@@ -248,7 +243,7 @@ def certainty_of(
     effect *= _alike(np.bincount(unit_of, weights * correct).astype(np.float64))
     least_units = max(STEP_UNITS, STEP_SHARE * float(weights.sum()))
     guessing = 1.0 / max(len(set(labels.tolist())), 2)
-    edges = [0.0, *_begins(known, weights, SUPPORT_BOUNDS, CLASS_UNITS), np.inf]
+    edges = [0.0, *bands_of(known, weights, SUPPORT_BOUNDS, CLASS_UNITS), np.inf]
     classes = []
     for least, end in pairwise(edges):
         rows = (known >= least) & (known < end)
@@ -343,7 +338,7 @@ def with_certainty(
     return result
 
 
-def _begins(
+def bands_of(
     values: NDArray[np.float64], weights: NDArray[np.float64], bounds: Sequence[float], least: float
 ) -> list[float]:
     """Return at which of these rising bounds a new band of values begins, so that each band has this weight."""
@@ -371,7 +366,7 @@ def _steps(
 
     probability = np.round(probability, 9)
     values = np.unique(probability)
-    edges = [float(values[0]), *_begins(probability, weights, values.tolist(), least_units)]
+    edges = [float(values[0]), *bands_of(probability, weights, values.tolist(), least_units)]
     bins = np.searchsorted(edges[1:], probability, side="right")
     all_of, right_of = np.bincount(bins, weights), np.bincount(bins, weights * right)
     rising = isotonic_regression(right_of / all_of, weights=all_of).x

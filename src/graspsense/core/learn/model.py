@@ -193,7 +193,7 @@ class Model:
             table, math.inf if self.certainty is None else self.certainty.reach
         )
         probabilities, members = shares, np.zeros(shares.shape, dtype=np.bool_)
-        intervals: Sequence[tuple[float, float] | None] = [None] * len(table)
+        intervals: list[tuple[float, float] | None] = [None] * len(table)
         if self.certainty is not None and not no_certainty:
             measured = np.array([not why for why in unmeasured])
             known &= measured
@@ -202,8 +202,8 @@ class Model:
             # No answer counts as less certain than chance, however seldom such answers were right.
             own = calibrated[np.arange(len(table)), columns].tolist()
             intervals = [
-                interval and (min(interval[0], sure), max(interval[1], sure))
-                for interval, sure in zip(self.certainty.intervals(answers), own, strict=True)
+                None if math.isnan(low) else (min(low, sure), max(high, sure))
+                for (low, _, high), sure in zip(self.certainty.bounds(answers).tolist(), own, strict=True)
             ]
             if self.sets is not None and self.sets.thresholds:
                 members[known] = self.sets.members(answers.rows(known), self.certainty)
