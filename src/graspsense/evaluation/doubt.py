@@ -9,7 +9,7 @@ import numpy as np
 from attrs import evolve, field, frozen
 from numpy.typing import NDArray
 
-from graspsense.core.learn.answers import Answers, answers_of
+from graspsense.core.learn.answers import Answers
 from graspsense.core.learn.certainty import Certainty, certainty_of
 from graspsense.core.learn.conformal import (
     COVERAGE,
@@ -104,10 +104,7 @@ def calibrated_by(model: Model, labelled: Labelled) -> Model:
     """
     classes = model.classifier.classes()
     known = labelled.rows(np.flatnonzero([label in classes for label in labelled.labels]))
-    _, shares = model.answers(known.table)
-    table = known.table.columns(model.names)
-    answers = answers_of(model.novelty, table, classes, shares, shares.argmax(axis=1), model.support(table))
-    return calibrated_with(model, answers, known)
+    return calibrated_with(model, model.answers(known.table), known)
 
 
 def calibrated_with(model: Model, answers: Answers, labelled: Labelled) -> Model:
