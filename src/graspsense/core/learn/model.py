@@ -183,7 +183,8 @@ class Model:
         is a trial for which that does not hold.
         """
         classes, columns, shares = answers.classes, answers.columns, answers.probabilities
-        known = ~answers.unlike
+        unlike = answers.unlike
+        known = ~unlike
         no_certainty = "it was not measured under these settings" if elsewhere else self.no_certainty
         unmeasured = self.novelty.unmeasured(
             table, math.inf if self.certainty is None else self.certainty.reach
@@ -209,7 +210,7 @@ class Model:
             without = no_certainty or unmeasured[i] or self._why_uncertain(nearest)
             made.append(
                 Prediction(
-                    label=UNKNOWN if answers.unlike[i] else nearest,
+                    label=UNKNOWN if unlike[i] else nearest,
                     probabilities=dict(zip(classes, probabilities[i].tolist(), strict=True)),
                     because=(),
                     prediction_set=tuple(classes[k] for k in order),
