@@ -547,6 +547,17 @@ def test_answers_of_a_cross_validation_count_for_less():
         assert certainty.rate(asked([1.0])) == pytest.approx([(right + 1.0) / (units + 2.0)])
 
 
+def test_guesses_among_several_labels_are_hardly_surer_than_guesses():
+    rng, labels, said = np.random.default_rng(0), [f"thing {k}" for k in range(5)] * 8, []
+    for _ in range(300):
+        certainty = certainty_from(
+            rng.uniform(size=40), (rng.uniform(size=40) < 0.2).tolist(), labels, effect=2.0
+        )
+        said += certainty.rate(asked([0.5] * 5, labels[:5])).tolist()
+    # Drawn towards a half, they would say 23 %.
+    assert 0.2 <= np.mean(said) < 0.22
+
+
 def test_answers_for_one_object_count_for_more_than_one_where_the_objects_hardly_differ():
     """Of 160 answers, 144 are right: in each of 20 objects alike, or none in two of them."""
     spread = [k % 10 != 0 for k in range(160)]
