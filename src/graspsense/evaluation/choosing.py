@@ -98,7 +98,7 @@ def choose(
     protocol, folds = _folds(known, seed)
     notes = [*dict.fromkeys(note for trial in trials.values() for note in trial.notes), *notes]
     if protocol != INSTANCE_HELD_OUT:
-        why = known.no_instances or "a label has a single instance"
+        why = known.no_instances or "too many labels have a single instance"
         notes.append(f"{why}: whole objects cannot be held out, so the rate is that for these objects")
     pairs = pairs or [(learner, name) for name in trials for learner in learners]
     answers: dict[tuple[str, str], _Answers] = {}
