@@ -112,7 +112,7 @@ def calibrated_with(model: Model, answers: Answers, labelled: Labelled) -> Model
 
     It has neither where these trials show that labels cannot be told from how they were recorded.
     """
-    held = HeldOut.of(labelled, answers)
+    held = HeldOut.from_trials(labelled, answers)
     calibration = confounded(labelled) or held.calibration(np.arange(len(labelled)))
     if isinstance(calibration, str):
         return evolve(model, sets=_no_sets(labelled, calibration))
@@ -156,7 +156,7 @@ class HeldOut:
     within: NDArray[np.int64] | None = None
 
     @classmethod
-    def of(cls, labelled: Labelled, answers: Answers, folds: Folds | None = None) -> HeldOut:
+    def from_trials(cls, labelled: Labelled, answers: Answers, folds: Folds | None = None) -> HeldOut:
         """Return the answers for these trials, in folds of their instances where each label has several."""
         return cls(
             answers=answers,
