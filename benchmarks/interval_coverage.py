@@ -70,8 +70,7 @@ def evaluated(k: int, repeats: int, *, objects: bool = True) -> dict[str, float]
         names = [f"bottle#{i}" for i in instance] if objects else None
         folds = held_out(labels, names, FOLDS, seed)
         ours, other = (
-            cross_validate(learner, table, labels, [np.arange(len(labels))], [folds], seed=seed).right(labels)
-            for learner in learners
+            cross_validate(learner, table, labels, folds, seed=seed).right(labels) for learner in learners
         )
         rates.append(rate_of(ours, names, folds=FOLDS))
         differences.append(difference(ours, other, names, folds=FOLDS))

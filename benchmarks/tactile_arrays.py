@@ -118,9 +118,7 @@ def answered(features: np.ndarray, labels: np.ndarray, folds: np.ndarray) -> np.
     names = tuple(f"f{k}" for k in range(features.shape[1]))
     table = FeatureTable(names=names, units=("1",) * len(names), values=features)
     learner = select_component("classifier", CLASSIFIER)
-    return np.array(
-        cross_validate(learner, table, labels.tolist(), [np.arange(len(labels))], [folds]).predicted
-    )
+    return np.array(cross_validate(learner, table, labels.tolist(), folds).predicted)
 
 
 def asked(python: str, series: np.ndarray, labels: np.ndarray, folds: np.ndarray) -> list[str]:

@@ -44,7 +44,7 @@ def answered(path: Path) -> None:
     values = np.array([[1e308] * len(model.names), [math.nan] * len(model.names), [0.06] * len(model.names)])
     table = FeatureTable(names=model.names, units=model.units, values=values)
     for part in (model, *(part for _, part in model.checkpoints)):
-        _, shares = part.answers(table)
+        shares = part.answers(table).probabilities
         assert np.abs(shares.sum(axis=1) - 1.0).max() < 1e-6
         part.predictions(table)
         for i in range(len(table)):

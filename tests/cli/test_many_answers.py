@@ -32,13 +32,16 @@ def test_all_at_once_is_one_by_one(rows, name):
     model = trained(rows, name, tuple(np.repeat(["a:x", "b:y", "c:z"], 80).tolist()))
     far = np.array([[50.0, 0.0, 0.0], [np.nan, np.nan, np.nan], [0.0, np.nan, -70.0]])
     asked = table(np.concatenate((rows, rows + 2.0, far)))
-    predicted, shares = model.answers(asked)
+    answers = model.answers(asked)
+    predicted = [
+        UNKNOWN if far else name for name, far in zip(answers.predicted, answers.unlike, strict=True)
+    ]
     alone = [model.predict(asked.row(i)) for i in range(len(asked))]
     assert predicted == [prediction.label for prediction in alone]
     assert UNKNOWN in predicted
     assert set(predicted) > {"a:x", "b:y", "c:z"}
     expected = [list(prediction.probabilities.values()) for prediction in alone]
-    np.testing.assert_allclose(shares, expected, atol=1e-12)
+    np.testing.assert_allclose(answers.probabilities, expected, atol=1e-12)
 
 
 def trained(rows, name, labels):

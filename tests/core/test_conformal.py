@@ -12,8 +12,9 @@ from commands import answered, printed
 from test_evaluate import judged, labelled, learner
 
 from graspsense.core.components.registry import installed
+from graspsense.core.learn.answers import Answers
 from graspsense.core.learn.certainty import Certainty, SupportClass, certainty_of
-from graspsense.core.learn.conformal import Answers, sets_of, units_lacking, units_needed
+from graspsense.core.learn.conformal import sets_of, units_lacking, units_needed
 from graspsense.core.learn.model_file import as_json, load_model, write_model
 from graspsense.core.learn.training import train
 from graspsense.core.values.errors import ComponentFailed
@@ -44,6 +45,28 @@ def model_of(trials, name):
     return calibrated(model, learner(name), trials, 0)
 
 
+def answers_with(scores, columns, classes, support=None):
+    """Answers with these scores as their probabilities, of models that learned from trials like these."""
+    return Answers(
+        classes=tuple(classes),
+        probabilities=np.asarray(scores, float),
+        scores=np.asarray(scores, float),
+        columns=np.asarray(columns),
+        support=np.full(len(columns), np.nan) if support is None else np.asarray(support, float),
+        outside=np.zeros(len(columns)),
+    )
+
+
+def sure_of(rate, classes=1):
+    """A certainty that is the same for all answers, with so many classes of support: 0, 1, and so on."""
+    return Certainty(
+        classes=tuple(
+            SupportClass(least=float(k), probabilities=(0.0,), rates=(rate,), units=100.0)
+            for k in range(classes)
+        )
+    )
+
+
 def calibrated_by(truth, labels, instances=None, right=None, support_class=None):
     """The sets of held-out trials with these scores of their true labels; those that are not right are `other`."""
     n = len(truth)
@@ -51,25 +74,16 @@ def calibrated_by(truth, labels, instances=None, right=None, support_class=None)
     columns = np.array([classes.index(label) for label in labels])
     scores = np.zeros((n, len(classes)))
     scores[np.arange(n), columns] = truth
-    answers = Answers(
-        scores=scores,
-        predicted=np.where(np.zeros(n, bool) if right is None else right, columns, len(classes) - 1),
-        certainty=np.zeros(n),
-        support_class=np.zeros(n, int) if support_class is None else support_class,
-    )
-    return sets_of(answers, columns, classes, instances)
+    predicted = np.where(np.zeros(n, bool) if right is None else right, columns, len(classes) - 1)
+    answers = answers_with(scores, predicted, classes, support_class)
+    return sets_of(answers, labels, instances, sure_of(0.0, 1 if support_class is None else 2))
 
 
 def set_of(sets, scores, label, certainty=1.0, support_class=0):
     """The set of a trial with these scores, of which `label` is the prediction."""
     classes = tuple(scores)
-    answers = Answers(
-        scores=np.array([list(scores.values())]),
-        predicted=np.array([classes.index(label)]),
-        certainty=np.array([certainty]),
-        support_class=np.array([support_class]),
-    )
-    (inside,) = sets.members(answers, classes)
+    answers = answers_with([list(scores.values())], [classes.index(label)], classes, [support_class])
+    (inside,) = sets.members(answers, sure_of(certainty, len(sets.of_support)))
     return {name for name, member in zip(classes, inside, strict=True) if member}
 
 
@@ -77,19 +91,18 @@ def threshold(sets):
     return sets.thresholds["a"].score
 
 
-def certainty_from(probability, right, labels=None, effect=1.0):
+def certainty_from(probability, right, labels=None, effect=1.0, units=None):
     """The certainty of held-out answers with these probabilities, each of a trial by itself."""
-    n = len(right)
-    units = [str(i) for i in range(n)]
-    return certainty_of(
-        np.asarray(probability), np.full(n, np.nan), labels or ["can"] * n, right, units, effect
-    )
+    return certainty_of(asked(probability, labels), right, units or list(map(str, range(len(right)))), effect)
 
 
 def asked(probability, labels=None):
-    """New answers with these probabilities, without a support, as a certainty takes them."""
-    n = len(probability)
-    return np.asarray(probability), np.full(n, np.nan), labels or ["can"] * n
+    """Answers with these probabilities, without a support."""
+    labels = labels or ["can"] * len(probability)
+    classes = sorted(set(labels))
+    columns = [classes.index(label) for label in labels]
+    scores = np.tile(np.asarray(probability, float)[:, np.newaxis], len(classes))
+    return answers_with(scores, columns, classes)
 
 
 def kept(model, folder):
@@ -183,7 +196,9 @@ def test_what_a_label_lacks_for_sets_is_counted_in_instances_where_each_label_ha
     two = {("full", "full#1"): 20, ("full", "full#2"): 1, ("empty", "empty#1"): 5, ("empty", "empty#2"): 5}
 
     assert units_lacking(two) == ("instances", {"empty": 7, "full": 7})
-    assert units_lacking({**two, ("jar", "jar#1"): 4}) == ("trials", {"empty": 0, "full": 0, "jar": 5})
+    assert units_lacking({**two, ("jar", "jar#1"): 4}) == ("instances", {"empty": 7, "full": 7, "jar": 8})
+    single = {("jar", "jar#1"): 4, ("can", "can#1"): 4}
+    assert units_lacking({**two, **single}) == ("trials", {"can": 5, "empty": 0, "full": 0, "jar": 5})
     assert units_lacking({("full", None): 12}, 0.95) == ("trials", {"full": 7})
 
 
@@ -376,8 +391,8 @@ def test_the_interval_of_a_certainty_holds_for_new_answers_and_its_highest_is_no
         probability = rng.uniform(0.4, 1.0, n)
         right = rng.uniform(size=n) < rate_of(probability)
         certainty = certainty_from(probability, right.tolist())
-        highest += certainty.rate(*asked([1.0])).tolist()
-        intervals = np.array(certainty.intervals(*asked(fresh)))
+        highest += certainty.rate(asked([1.0])).tolist()
+        intervals = certainty.bounds(asked(fresh))[:, [0, 2]]
         for low, high in np.unique(intervals, axis=0):
             rests_on_as_much = intervals[:, 0] == low
             held += [low <= rate_of(fresh[rests_on_as_much]).mean() <= high] * int(rests_on_as_much.sum())
@@ -502,11 +517,11 @@ def test_the_certainty_of_a_rare_label_is_not_that_of_the_frequent_one():
     certainty = certainty_from([0.9] * len(labels), right, labels)
     answers = asked([0.9] * 4, ["can", "cup", "jar", "pan"])
 
-    can, cup, jar, pan = certainty.rate(*answers)
+    can, cup, jar, pan = certainty.rate(answers)
     assert 0.88 < can < 0.96
     assert cup == pytest.approx(0.6, abs=0.01)
     assert np.isnan([jar, pan]).all(), "four answers do not tell, nor does none"
-    (low, high), (lowest, highest) = certainty.intervals(*answers)[:2]
+    (low, _, high), (lowest, _, highest) = certainty.bounds(answers)[:2]
     assert low < can < high
     assert lowest < 0.45 < 0.75 < highest, "the interval is that of 20 answers"
 
@@ -518,7 +533,7 @@ def test_rare_labels_whose_few_answers_were_all_right_are_hardly_surer_than_othe
     for _ in range(200):
         right = [*(rng.uniform(size=80) < 0.9), *np.repeat(rng.uniform(size=15) < 0.6, 2)]
         certainty = certainty_from([0.9] * len(labels), right, labels, effect=2.0)
-        said += certainty.rate(*asked([0.9] * 3, rare)).tolist()
+        said += certainty.rate(asked([0.9] * 3, rare)).tolist()
     assert np.mean(said) == pytest.approx(0.6, abs=0.05)
     assert np.quantile(said, 0.95) < 0.79, "without what is known of all rare labels it would be 0.84"
 
@@ -529,7 +544,18 @@ def test_answers_of_a_cross_validation_count_for_less():
         # All are right, of two labels: the square of the distance from guessing, 1/2, is so many variances.
         variances = units * (units + 2) ** 2 / 4.0 / (units + 1)
         right = units * (1.0 - 0.5 / (variances + 1.0))
-        assert certainty.rate(*asked([1.0])) == pytest.approx([(right + 1.0) / (units + 2.0)])
+        assert certainty.rate(asked([1.0])) == pytest.approx([(right + 1.0) / (units + 2.0)])
+
+
+def test_guesses_among_several_labels_are_hardly_surer_than_guesses():
+    rng, labels, said = np.random.default_rng(0), [f"thing {k}" for k in range(5)] * 8, []
+    for _ in range(300):
+        certainty = certainty_from(
+            rng.uniform(size=40), (rng.uniform(size=40) < 0.2).tolist(), labels, effect=2.0
+        )
+        said += certainty.rate(asked([0.5] * 5, labels[:5])).tolist()
+    # Drawn towards a half, they would say 23 %.
+    assert 0.2 <= np.mean(said) < 0.22
 
 
 def test_answers_for_one_object_count_for_more_than_one_where_the_objects_hardly_differ():
@@ -539,14 +565,33 @@ def test_answers_for_one_object_count_for_more_than_one_where_the_objects_hardly
     objects = [str(k // 8) for k in range(160)]
     said = []
     for right, units in ((spread, objects), (together, objects), ([k > 1 for k in range(20)], None)):
-        n = len(right)
-        certainty = certainty_of(
-            np.ones(n), np.full(n, np.nan), ["can"] * n, right, units or [str(k) for k in range(n)], 2.0
-        )
-        said += certainty.rate(*asked([1.0])).tolist()
+        certainty = certainty_from(np.ones(len(right)), right, effect=2.0, units=units)
+        said += certainty.rate(asked([1.0])).tolist()
     assert said[0] == pytest.approx(0.88, abs=0.02)
     assert said[1] == pytest.approx(said[2])
     assert said[1] < said[0] - 0.03
+
+
+def test_a_label_with_a_single_object_has_no_certainty_and_others_are_not_too_sure_beside_it():
+    """Objects of a label differ: those of three labels are known by 10 others, of the fourth one only one is."""
+    said, told = [], 0
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        means = rng.normal(size=(4, 4))
+        kinds = np.array([*np.repeat([1, 2, 3], 10), 0])
+        own = np.repeat(means[kinds] + 0.7 * rng.normal(size=(31, 4)), 3, axis=0)
+        names = [f"{k}#{i}" for i, k in enumerate(kinds) for _ in range(3)]
+        values = own + 0.3 * rng.normal(size=own.shape)
+        model = model_of(labelled([name[0] for name in names], *values.T, instances=tuple(names)), "svm")
+        new = rng.choice(kinds, 200)
+        asked_about = labelled(["?"] * 200, *(means[new] + 0.76 * rng.normal(size=(200, 4))).T)
+        for answer, kind in zip(model.predictions(asked_about.table), new, strict=True):
+            told += answer.label == "0" and answer.certainty is not None
+            if answer.certainty is not None:
+                said.append(answer.certainty - (answer.label == str(kind)))
+    assert told == 0
+    # With single trials held out it would be 6 points.
+    assert np.mean(said) < 0.03
 
 
 def test_an_answer_that_is_seldom_given_has_no_certainty_and_no_set_of_its_own(tmp_path):

@@ -59,8 +59,7 @@ def test_it_comes_back_the_same_without_its_training_trials(name, tmp_path):
     assert "trials" not in json.loads((tmp_path / "m.json").read_text())["model"]
     again = load_model(str(tmp_path / "m.json"), installed())
     asked = trials(2).table
-    for answer, expected in zip(again.answers(asked), model.answers(asked), strict=True):
-        np.testing.assert_array_equal(answer, expected)
+    np.testing.assert_array_equal(again.answers(asked).scores, model.answers(asked).scores)
     assert again.predict(asked.row(0)).because == model.predict(asked.row(0)).because
 
 

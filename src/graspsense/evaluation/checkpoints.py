@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 from numpy.typing import NDArray
 
 from graspsense.core.learn.checkpoints import CheckpointTrials
@@ -14,7 +14,7 @@ from graspsense.core.learn.labelled import Labelled
 from graspsense.core.learn.model import Model, checkpoint_model
 from graspsense.core.learn.training import train
 from graspsense.core.settings.selected import SelectedComponent
-from graspsense.evaluation.crossval import columns_of, cross_validate
+from graspsense.evaluation.crossval import cross_validate
 from graspsense.evaluation.doubt import HeldOut, calibrated, calibrated_by, exchangeable_instances
 from graspsense.evaluation.folds import Folds, held_out, held_out_protocol
 from graspsense.evaluation.intervals import RecognitionRate, rate_among
@@ -131,20 +131,20 @@ def _answers(
     fold_of: Folds,
     seed: int,
 ) -> _Answers:
-    labels, numbers, n = part.labelled.labels, part.rows.tolist(), len(fold_of)
-    own = None if instances is None else [instances[i] for i in numbers]
-    groups, folds = [np.arange(len(labels))], [fold_of[part.rows]]
-    pooled = cross_validate(learner, part.labelled.table, labels, groups, folds, seed=seed)
+    numbers, n, folds = part.rows.tolist(), len(fold_of), fold_of[part.rows]
+    own = None if instances is None else tuple(instances[i] for i in numbers)
+    labels = part.labelled.labels
+    pooled = cross_validate(learner, part.labelled.table, labels, folds, seed=seed)
     predicted = [""] * n
     for i, label in zip(numbers, pooled.predicted, strict=True):
         predicted[i] = label
     sizes, covered, reason = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.bool_), ""
-    inside = HeldOut(pooled=pooled, labels=labels, instances=own, groups=groups, folds=folds).members()
+    inside = evolve(HeldOut.from_trials(part.labelled, pooled, folds), instances=own).members()
     if isinstance(inside, str):
         reason = inside
     else:
         sizes[part.rows] = np.where(pooled.unlike, 0, inside.sum(axis=1))
-        covered[part.rows] = inside[np.arange(len(labels)), columns_of(labels, pooled.classes)]
+        covered[part.rows] = inside[np.arange(len(labels)), pooled.columns_of(labels)]
     return _Answers(predicted=tuple(predicted), sizes=sizes, covered=covered, reason=reason)
 
 

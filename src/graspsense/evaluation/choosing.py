@@ -19,14 +19,15 @@ from itertools import combinations
 from typing import Final
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 from numpy.typing import NDArray
 
+from graspsense.core.learn.answers import Answers
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.values.errors import FAILURES, ConfigError, counted, named
 from graspsense.core.values.features import FeatureTable
 from graspsense.evaluation.chosen import ChosenRate
-from graspsense.evaluation.crossval import ClassifierFactory, Pooled, cross_validate, fit_and_predict
+from graspsense.evaluation.crossval import ClassifierFactory, cross_validate, fit_and_predict
 from graspsense.evaluation.folds import INSTANCE_HELD_OUT, Folds
 from graspsense.evaluation.gathered_warnings import gathered_warnings
 from graspsense.evaluation.intervals import RecognitionRate, rate_of
@@ -54,7 +55,7 @@ class ChosenPipeline:
     """
 
     rate: RecognitionRate
-    answers: Pooled
+    answers: Answers
     right: tuple[bool, ...]
     chosen_in: Mapping[str, int]
     ranking: Ranking
@@ -74,7 +75,7 @@ class _Answers:
     """
 
     inner: NDArray[np.bool_]
-    outer: Pooled
+    outer: Answers
     training_s: float
 
 
@@ -97,7 +98,7 @@ def choose(
     protocol, folds = _folds(known, seed)
     notes = [*dict.fromkeys(note for trial in trials.values() for note in trial.notes), *notes]
     if protocol != INSTANCE_HELD_OUT:
-        why = known.no_instances or "a label has a single instance"
+        why = known.no_instances or "too many labels have a single instance"
         notes.append(f"{why}: whole objects cannot be held out, so the rate is that for these objects")
     pairs = pairs or [(learner, name) for name in trials for learner in learners]
     answers: dict[tuple[str, str], _Answers] = {}
@@ -150,7 +151,7 @@ def _folds(trials: Labelled, seed: int) -> tuple[str, Folds]:
     return protocol, folds
 
 
-def _nested(answers: Mapping[tuple[str, str], _Answers], folds: Folds) -> tuple[Pooled, dict[str, int]]:
+def _nested(answers: Mapping[tuple[str, str], _Answers], folds: Folds) -> tuple[Answers, dict[str, int]]:
     """Return the answers of the procedure, and how often it chose each candidate.
 
     Support counts only where every answer is by the same candidate: of others, it is the support of something else.
@@ -162,15 +163,13 @@ def _nested(answers: Mapping[tuple[str, str], _Answers], folds: Folds) -> tuple[
     outer = [answers[key].outer for key in chosen]
     rows = np.arange(len(folds))
     alike = len(set(chosen)) == 1
-    nested = Pooled(
-        predicted=tuple(outer[fold].predicted[i] for i, fold in enumerate(folds.tolist())),
-        classes=outer[0].classes,
-        probabilities=np.array([pooled.probabilities for pooled in outer])[folds, rows],
-        scores=np.array([pooled.scores for pooled in outer])[folds, rows],
+    nested = evolve(
+        outer[0],
+        columns=np.array([of_fold.columns for of_fold in outer])[folds, rows],
+        probabilities=np.array([of_fold.probabilities for of_fold in outer])[folds, rows],
+        scores=np.array([of_fold.scores for of_fold in outer])[folds, rows],
         support=outer[0].support if alike else np.full(len(folds), np.nan),
-        outside=np.array([pooled.outside for pooled in outer])[folds, rows],
-        trained_on=outer[0].trained_on,
-        folds=outer[0].folds,
+        outside=np.array([of_fold.outside for of_fold in outer])[folds, rows],
     )
     return nested, dict(Counter(" with ".join(key) for key in chosen).most_common())
 
@@ -180,8 +179,7 @@ def _answers(learner: ClassifierFactory, trials: Labelled, folds: Folds, seed: i
     count = int(folds.max()) + 1
     inner = np.zeros((count, len(folds)), dtype=np.bool_)
     began = time.perf_counter()
-    every = [np.arange(len(folds))]
-    outer = cross_validate(learner, trials.table, trials.labels, every, [folds], seed=seed)
+    outer = cross_validate(learner, trials.table, trials.labels, folds, seed=seed)
     training_s = (time.perf_counter() - began) / count
     for fold, other in combinations(range(count), 2):
         away = (folds == fold) | (folds == other)

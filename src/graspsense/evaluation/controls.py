@@ -6,13 +6,13 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from graspsense.core.learn.answers import Answers
 from graspsense.core.learn.labelled import ControlFeatures
 from graspsense.core.values.errors import counted
-from graspsense.evaluation.crossval import FitRefused, Groups, Pooled
+from graspsense.evaluation.crossval import FitRefused
 from graspsense.evaluation.evaluator import Evaluator, Headline
-from graspsense.evaluation.folds import Folds, commonest, in_order, instance_held_out
+from graspsense.evaluation.folds import commonest, in_order, instance_held_out, splits
 from graspsense.evaluation.intervals import RecognitionRate, percent, rate_among
 from graspsense.evaluation.results import Measurement
 
@@ -27,7 +27,7 @@ class ControlMeasurements:
         self.evaluator, self.headline = evaluator, headline
         self.trials, self.labels = evaluator.trials, evaluator.labels
         self.warnings: list[str] = []
-        self.predicted: dict[str, tuple[Pooled, list[int]]] = {}
+        self.predicted: dict[str, tuple[Answers, list[int]]] = {}
         """The predictions of the controls with other features, and the trials that these are of."""
 
     def measure(self, protocols: Mapping[str, Measurement], permutations: int) -> dict[str, Measurement]:
@@ -73,14 +73,15 @@ class ControlMeasurements:
         having, having_words = control.having, control.having_words
         if not having.any():
             return Measurement(control.what, reason=having_words)
-        groups, folds = _among(having, self.evaluator.groups, self.headline.folds)
-        if not groups:
+        folds = np.where(having, self.headline.folds, -1)
+        tested = [test for test, _ in splits(folds, self.evaluator.within)]
+        if not tested:
             return Measurement(control.what, reason=f"{having_words}; these are too few to learn from")
         try:
-            pooled = self.evaluator.pooled(name, control.table, folds, groups=groups)
+            pooled = self.evaluator.pooled(name, control.table, folds)
         except FitRefused as refusal:
             return Measurement(control.what, reason=str(refusal))
-        rows = np.sort(np.concatenate(list(groups))).tolist()
+        rows = np.sort(np.concatenate(tested)).tolist()
         self.predicted[name] = (pooled, rows)
         what = control.what if len(rows) == len(having) else f"{control.what}; {having_words}"
         return self.evaluator.against(what, pooled, self.headline.pooled, self.headline.protocol, rows)
@@ -209,16 +210,3 @@ class ControlMeasurements:
             return False
         held = evaluator.pooled_by_protocol[evaluator.held_out_name]
         return evaluator.difference(pooled.right(self.labels), held.right(self.labels)).is_positive
-
-
-def _among(
-    having: NDArray[np.bool_], groups: Groups, folds: Sequence[Folds]
-) -> tuple[list[NDArray[np.int64]], list[Folds]]:
-    """Return groups and folds of the trials in a mask, without groups that are not in several folds."""
-    kept_groups, kept_folds = [], []
-    for rows, fold in zip(groups, folds, strict=True):
-        kept = having[rows]
-        if len(np.unique(fold[kept])) > 1:
-            kept_groups.append(rows[kept])
-            kept_folds.append(fold[kept])
-    return kept_groups, kept_folds

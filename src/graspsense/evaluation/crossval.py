@@ -7,16 +7,15 @@ from math import nan
 from typing import Any, Protocol
 
 import numpy as np
-from attrs import frozen
 from numpy.typing import NDArray
 
 from graspsense.core.components.roles import Classifier
-from graspsense.core.learn.conformal import scores_of
+from graspsense.core.learn.answers import Answers, answers_of
 from graspsense.core.learn.model import refuse_improbable, refuse_unsupported
-from graspsense.core.learn.novelty import REACH, novelty_of
+from graspsense.core.learn.novelty import novelty_of
 from graspsense.core.values.errors import ComponentFailed, ConfigError, counted
 from graspsense.core.values.features import FeatureTable
-from graspsense.evaluation.folds import Folds
+from graspsense.evaluation.folds import Folds, splits
 
 
 class FitRefused(ConfigError):
@@ -30,46 +29,6 @@ class ClassifierFactory(Protocol):
         """Return a new, untrained classifier."""
 
 
-Groups = Sequence["NDArray[np.int64]"]
-"""Trials that are cross-validated separately: all of them, or those of each class."""
-
-
-@frozen(eq=False)
-class Pooled:
-    """The predictions of all folds, one per trial.
-
-    `probabilities` has shape (trials, classes), NaN for a class that is not among the labels of the group of the trial.
-    """
-
-    predicted: tuple[str, ...]
-    classes: tuple[str, ...]
-    probabilities: NDArray[np.float64]
-    scores: NDArray[np.float64]
-    """The scores from which prediction sets are made, of the same shape."""
-    support: NDArray[np.float64]
-    """The number of training trials that each answer rests on; NaN without such a number."""
-    outside: NDArray[np.float64]
-    """How far each trial is outside of those that the model of its fold learned from (`learn.novelty`)."""
-    trained_on: float
-    """Mean number of training trials per fold."""
-    folds: int
-    """The number of folds, 0 for the answers of a single model to other trials than its own."""
-
-    @property
-    def columns(self) -> NDArray[np.int64]:
-        """The column of each predicted label."""
-        return columns_of(self.predicted, self.classes)
-
-    @property
-    def unlike(self) -> NDArray[np.bool_]:
-        """Which trials the model of their fold calls unknown."""
-        return self.outside > REACH
-
-    def right(self, labels: Sequence[str]) -> list[bool]:
-        """Return whether each trial is predicted correctly."""
-        return [answer == label for answer, label in zip(self.predicted, labels, strict=True)]
-
-
 def refuse_without_features(table: FeatureTable) -> None:
     """Raise FitRefused if no trial has a feature."""
     if np.isnan(table.values).all():
@@ -78,71 +37,61 @@ def refuse_without_features(table: FeatureTable) -> None:
         )
 
 
-def columns_of(labels: Sequence[str], classes: Sequence[str]) -> NDArray[np.int64]:
-    """Return the column of each of these labels."""
-    column = {name: k for k, name in enumerate(classes)}
-    return np.array([column[label] for label in labels], dtype=np.int64)
-
-
 def cross_validate(
     learner: ClassifierFactory,
     table: FeatureTable,
     labels: Sequence[str],
-    groups: Groups,
-    folds: Sequence[Folds],
+    folds: Folds,
+    within: NDArray[np.int64] | None = None,
     *,
     seed: int = 0,
     share: float = 1.0,
     progress: Callable[[], None] | None = None,
-) -> Pooled:
-    """Predict every trial of every group, with the folds of that group.
+) -> Answers:
+    """Predict the trials of every fold, as `splits` divides them, by models of the other folds.
 
-    `folds` has one array per group, of the length of the group. The prediction is the label with the largest
-    probability, the first of several. If the training trials of a fold have a single label, that label is predicted.
-    With `share`, training uses about that share of the training trials of each label, at least one. Raises FitRefused
-    if the classifier cannot learn from the training trials of a fold.
+    The prediction is the label with the largest probability, the first of several. If the training trials of a fold
+    have a single label, that label is predicted. A trial without a fold has no probabilities. With `share`, training
+    uses about that share of the training trials of each label, at least one. Raises FitRefused if the classifier cannot
+    learn from the training trials of a fold.
     """
     refuse_without_features(table)
-    predicted = [""] * len(labels)
-    all_classes = tuple(sorted(set(labels)))
-    probabilities = np.full((len(labels), len(all_classes)), np.nan)
-    scores = probabilities.copy()
-    outside = np.zeros(len(labels))
-    support = np.full(len(labels), np.nan)
+    n, all_classes = len(labels), tuple(sorted(set(labels)))
+    probabilities, scores = np.full((2, n, len(all_classes)), np.nan)
+    outside, support, predicted = np.zeros(n), np.full(n, np.nan), np.zeros(n, dtype=np.int64)
     sizes: list[int] = []
-    for rows, fold_of in zip(groups, folds, strict=True):
-        of_group = {labels[i] for i in rows}
-        possible = np.flatnonzero([name in of_group for name in all_classes])
-        probabilities[np.ix_(rows, possible)] = 0.0
-        scores[np.ix_(rows, possible)] = 0.0
-        for fold in range(int(fold_of.max()) + 1):
-            test, training = rows[fold_of == fold], rows[fold_of != fold]
-            if len(test) == 0:
-                continue
-            if share < 1.0:
-                training = thinned(training, labels, share, seed)
-            known = [labels[i] for i in training]
-            classes, shares, support[test] = fit_and_predict(learner, table, training, known, test, seed)
-            columns = np.array([all_classes.index(name) for name in classes])
-            probabilities[np.ix_(test, columns)] = shares
-            novelty = novelty_of(table.rows(training), known)
-            tested = table.rows(test)
-            scores[np.ix_(test, columns)] = scores_of(shares, novelty.closeness(tested, classes))
-            outside[test] = novelty.outside(tested)
-            for i, k in zip(test.tolist(), shares.argmax(axis=1).tolist(), strict=True):
-                predicted[i] = classes[k]
-            sizes.append(len(training))
-            if progress is not None:
-                progress()
-    return Pooled(
-        predicted=tuple(predicted),
+    for test, training in splits(folds, within):
+        possible = {labels[i] for i in (*test, *training)}
+        columns = np.flatnonzero([name in possible for name in all_classes])
+        probabilities[np.ix_(test, columns)] = scores[np.ix_(test, columns)] = 0.0
+        if share < 1.0:
+            training = thinned(training, labels, share, seed)
+        known = [labels[i] for i in training]
+        classes, shares, support[test] = fit_and_predict(learner, table, training, known, test, seed)
+        columns = np.array([all_classes.index(name) for name in classes])
+        answers = answers_of(
+            novelty_of(table.rows(training), known),
+            table.rows(test),
+            classes,
+            shares,
+            columns[shares.argmax(axis=1)],
+            support[test],
+        )
+        probabilities[np.ix_(test, columns)], scores[np.ix_(test, columns)] = shares, answers.scores
+        outside[test], predicted[test] = answers.outside, answers.columns
+        sizes.append(len(training))
+        if progress is not None:
+            progress()
+    groups = [folds] if within is None else [folds[within == number] for number in np.unique(within)]
+    return Answers(
         classes=all_classes,
         probabilities=probabilities,
         scores=scores,
+        columns=predicted,
         support=support,
         outside=outside,
+        folds=max(len(np.unique(of_group)) for of_group in groups),
         trained_on=float(np.mean(sizes)),
-        folds=max(int(fold_of.max()) + 1 for fold_of in folds),
     )
 
 

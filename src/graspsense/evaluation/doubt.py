@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Final
 
 import numpy as np
 from attrs import evolve, field, frozen
 from numpy.typing import NDArray
 
-from graspsense.core.learn.certainty import (
-    Certainty,
-    certainty_of,
-    with_certainty,
-)
+from graspsense.core.learn.answers import Answers
+from graspsense.core.learn.certainty import Certainty, certainty_of
 from graspsense.core.learn.conformal import (
     COVERAGE,
-    Answers,
     PredictionSets,
+    can_be_held_out,
     reach_of,
-    scores_of,
     sets_of,
     units_needed,
 )
@@ -27,15 +23,8 @@ from graspsense.core.learn.confounding import confounded
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.learn.model import Model
 from graspsense.core.values.errors import ConfigError
-from graspsense.evaluation.crossval import (
-    ClassifierFactory,
-    FitRefused,
-    Groups,
-    Pooled,
-    columns_of,
-    cross_validate,
-)
-from graspsense.evaluation.folds import Folds, held_out
+from graspsense.evaluation.crossval import ClassifierFactory, FitRefused, cross_validate
+from graspsense.evaluation.folds import Folds, held_out, splits
 from graspsense.evaluation.intervals import RecognitionRate, effect_of
 
 FOLDS: Final = 10
@@ -100,14 +89,12 @@ def calibrated(model: Model, learner: ClassifierFactory, labelled: Labelled, see
 
     Whole instances are held out where each label has several; otherwise each trial is a unit.
     """
-    instances = exchangeable_instances(labelled)
-    labels = labelled.labels
     try:
-        folds = held_out(labels, instances, FOLDS, seed)
-        pooled = cross_validate(learner, labelled.table, labels, [np.arange(len(labels))], [folds], seed=seed)
+        folds = held_out(labelled.labels, exchangeable_instances(labelled), FOLDS, seed)
+        answers = cross_validate(learner, labelled.table, labelled.labels, folds, seed=seed)
     except (FitRefused, ConfigError) as refusal:
         return evolve(model, sets=_no_sets(labelled, str(refusal)))
-    return calibrated_with(model, pooled, labelled)
+    return calibrated_with(model, answers, labelled)
 
 
 def calibrated_by(model: Model, labelled: Labelled) -> Model:
@@ -117,125 +104,100 @@ def calibrated_by(model: Model, labelled: Labelled) -> Model:
     """
     classes = model.classifier.classes()
     known = labelled.rows(np.flatnonzero([label in classes for label in labelled.labels]))
-    _, shares = model.answers(known.table)
-    table = known.table.columns(model.names)
-    pooled = Pooled(
-        predicted=tuple(classes[k] for k in shares.argmax(axis=1).tolist()),
-        classes=classes,
-        probabilities=shares,
-        scores=scores_of(shares, model.novelty.closeness(table, classes)),
-        support=model.support(table),
-        outside=model.novelty.outside(table),
-        trained_on=float(model.provenance.get("trials", 0)),
-        folds=0,
-    )
-    return calibrated_with(model, pooled, known)
+    return calibrated_with(model, model.answers(known.table), known)
 
 
-def calibrated_with(model: Model, answers: Pooled, labelled: Labelled) -> Model:
+def calibrated_with(model: Model, answers: Answers, labelled: Labelled) -> Model:
     """Return a model with certainty and prediction sets from answers for its trials, made without their instances.
 
     It has neither where these trials show that labels cannot be told from how they were recorded.
     """
-    instances, trials = exchangeable_instances(labelled), len(labelled)
-    calibration = confounded(labelled) or _calibration(answers, labelled.labels, instances, np.arange(trials))
+    held = HeldOut.from_trials(labelled, answers)
+    calibration = confounded(labelled) or held.calibration(np.arange(len(labelled)))
     if isinstance(calibration, str):
         return evolve(model, sets=_no_sets(labelled, calibration))
     certainty, sets = calibration
-    return evolve(
-        model,
-        certainty=certainty,
-        sets=evolve(
-            sets,
-            unit=_unit(instances, labelled.grouped, labelled.sessions),
-            unknown=int(answers.unlike.sum()),
-            trials=trials,
-        ),
-    )
+    sets = evolve(sets, unit=held.unit, unknown=int(answers.unlike.sum()), trials=len(labelled))
+    return evolve(model, certainty=certainty, sets=sets)
 
 
 def _no_sets(labelled: Labelled, why: str) -> PredictionSets:
-    unit = _unit(exchangeable_instances(labelled), labelled.grouped, labelled.sessions)
-    return PredictionSets(coverage=COVERAGE, unit=unit, thresholds={}, reason=why)
+    return PredictionSets(coverage=COVERAGE, unit=_unit(labelled), thresholds={}, reason=why)
 
 
-def _unit(instances: Sequence[str] | None, grouped: bool = False, sessions: bool = False) -> str:
-    """Return what is held out, one of `conformal.UNITS`."""
-    named = "sessions" if sessions else "groups" if grouped else "instances"
-    return "trials" if instances is None else named
-
-
-def _calibration(
-    pooled: Pooled, labels: Sequence[str], instances: Sequence[str] | None, rows: NDArray[np.int64]
-) -> _Calibration | str:
-    """Return what these held-out trials tell, or the reason why they have too few units for anything."""
-    numbers = rows.tolist()
-    own = None if instances is None else [instances[i] for i in numbers]
-    # An instance may have several labels, such as a bottle in each of its states: these are answers of their own.
-    units = [str(i) if instances is None else f"{labels[i]} {instances[i]}" for i in numbers]
-    count = len(set(units if own is None else own))
-    if count < units_needed():
-        return f"{count} calibration {_unit(own)}, {100 * COVERAGE:.0f} % needs {units_needed()}"
-    right = pooled.right(labels)
-    certainty = certainty_of(
-        pooled.probabilities[rows, pooled.columns[rows]],
-        pooled.support[rows],
-        [pooled.predicted[i] for i in numbers],
-        [right[i] for i in numbers],
-        units,
-        effect_of(pooled.folds),
-    )
-    certainty = evolve(certainty, reach=reach_of(pooled.outside[rows], np.array(units)))
-    truth = columns_of(labels, pooled.classes)[rows]
-    return certainty, sets_of(_answers(certainty, pooled, rows), truth, pooled.classes, own)
-
-
-def _answers(certainty: Certainty, pooled: Pooled, rows: NDArray[np.int64]) -> Answers:
-    predicted, support = pooled.columns[rows], pooled.support[rows]
-    return Answers(
-        scores=pooled.scores[rows],
-        predicted=predicted,
-        certainty=certainty.rate(
-            pooled.probabilities[rows, predicted], support, [pooled.predicted[i] for i in rows.tolist()]
-        ),
-        support_class=certainty.class_of(support),
-    )
+def _unit(labelled: Labelled) -> str:
+    """Return what is held out of these trials, one of `conformal.UNITS`."""
+    if exchangeable_instances(labelled) is None:
+        return "trials"
+    return "sessions" if labelled.sessions else "groups" if labelled.grouped else "instances"
 
 
 def exchangeable_instances(labelled: Labelled) -> tuple[str, ...] | None:
-    """Return the instances of the trials; None if they are not known, or if a label has a single named one."""
+    """Return the instances of the trials; None if they are not known, or named ones cannot be held out."""
     if labelled.instances is None or labelled.grouped:
         return labelled.instances
-    pairs = set(zip(labelled.labels, labelled.instances, strict=True))
-    several = all(sum(label == name for name, _ in pairs) > 1 for label in labelled.classes)
-    return labelled.instances if several else None
+    named = {*zip(labelled.labels, labelled.instances, strict=True)}
+    return labelled.instances if can_be_held_out(named) else None
 
 
 @frozen(kw_only=True, eq=False)
 class HeldOut:
-    """Predictions of held-out trials, their true labels, the instances held out if any, and the folds of each group.
+    """Answers for held-out trials with their true labels: what every figure of certainty is computed from.
 
-    `grouped` says that the instances are those of `learn.groups`. What is said of the trials of a fold is calibrated
-    with the predictions of the other folds.
+    `instances` are those that were held out, if any, and `unit` what they are, one of `conformal.UNITS`. What is said
+    of the trials of a fold is calibrated with the other folds that were trained for it (`folds.splits`).
     """
 
-    pooled: Pooled
+    answers: Answers
     labels: Sequence[str]
     instances: Sequence[str] | None
-    groups: Groups
-    folds: Sequence[Folds]
-    grouped: bool = False
+    unit: str
+    folds: Folds
+    within: NDArray[np.int64] | None = None
+
+    @classmethod
+    def from_trials(cls, labelled: Labelled, answers: Answers, folds: Folds | None = None) -> HeldOut:
+        """Return the answers for these trials, in folds of their instances where each label has several."""
+        return cls(
+            answers=answers,
+            labels=labelled.labels,
+            instances=exchangeable_instances(labelled),
+            unit=_unit(labelled),
+            folds=np.arange(len(labelled)) if folds is None else folds,
+        )
+
+    def calibration(self, rows: NDArray[np.int64]) -> _Calibration | str:
+        """Return what these trials tell, or the reason why they have too few units for anything."""
+        answers, numbers = self.answers.rows(rows), rows.tolist()
+        labels = [self.labels[i] for i in numbers]
+        own = None if self.instances is None else [self.instances[i] for i in numbers]
+        # An instance may have several labels, such as a bottle in each of its states: these are answers of their own.
+        units = [
+            str(i) if own is None else f"{label} {own[k]}"
+            for k, (i, label) in enumerate(zip(numbers, labels, strict=True))
+        ]
+        count = len(set(units if own is None else own))
+        if count < units_needed():
+            unit = "trials" if own is None else "instances"
+            return f"{count} calibration {unit}, {100 * COVERAGE:.0f} % needs {units_needed()}"
+        certainty = certainty_of(answers, answers.right(labels), units, effect_of(answers.folds))
+        # Trials of a label that the model of their fold did not know are rightly outside; only these have no score.
+        known = answers.scores[np.arange(len(labels)), answers.columns_of(labels)] > 0.0
+        if known.any():
+            certainty = evolve(certainty, reach=reach_of(answers.outside[known], np.array(units)[known]))
+        return certainty, sets_of(answers, labels, own, certainty)
 
     def members(self) -> NDArray[np.bool_] | str:
         """Return which labels belong to the set of each trial, shape (trials, classes), or why there are no sets."""
-        inside = np.zeros(self.pooled.scores.shape, dtype=np.bool_)
-        for test, calibration in self._calibrations():
+        inside = np.zeros(self.answers.scores.shape, dtype=np.bool_)
+        for test, others in splits(self.folds, self.within):
+            calibration = self.calibration(others)
             if isinstance(calibration, str):
                 return calibration
             certainty, sets = calibration
             if not sets.thresholds:
                 return sets.reason
-            inside[test] = sets.members(_answers(certainty, self.pooled, test), self.pooled.classes)
+            inside[test] = sets.members(self.answers.rows(test), certainty)
         return inside
 
     def set_coverage(self, rate_of: RateOf) -> SetCoverage:
@@ -244,18 +206,19 @@ class HeldOut:
         The model of a fold does not know the instances that it is tested on. The thresholds do indirectly: the models
         of the other folds were trained on them.
         """
-        labels, classes, unit = self.labels, self.pooled.classes, _unit(self.instances, self.grouped)
-        inside = self.members()
+        labels, inside = self.labels, self.members()
         if isinstance(inside, str):
-            return SetCoverage(asked=COVERAGE, unit=unit, reason=inside)
-        covered = inside[np.arange(len(labels)), columns_of(labels, classes)].tolist()
+            return SetCoverage(asked=COVERAGE, unit=self.unit, reason=inside)
+        covered = inside[np.arange(len(labels)), self.answers.columns_of(labels)].tolist()
         sizes = inside.sum(axis=1)
-        rows_of = {name: [i for i, label in enumerate(labels) if label == name] for name in classes}
-        right = np.array(self.pooled.right(labels))
+        rows_of = {
+            name: [i for i, label in enumerate(labels) if label == name] for name in self.answers.classes
+        }
+        right = np.array(self.answers.right(labels))
         below = [i for row in rows_of.values() if right[row].mean() < COVERAGE for i in row]
         return SetCoverage(
             asked=COVERAGE,
-            unit=unit,
+            unit=self.unit,
             covered=rate_of(covered, None),
             covered_below=rate_of(covered, sorted(below)) if below else None,
             by_label={name: rate_of(covered, row) for name, row in rows_of.items()},
@@ -265,31 +228,23 @@ class HeldOut:
 
     def reliability(self, rate_of: RateOf) -> Reliability:
         """Return how well the probabilities, calibrated as a model gives them, agree with the rate."""
-        pooled = self.pooled
-        probabilities = pooled.probabilities.copy()
-        for test, calibration in self._calibrations():
+        answers, probabilities = self.answers, self.answers.probabilities.copy()
+        for test, others in splits(self.folds, self.within):
+            calibration = self.calibration(others)
             if not isinstance(calibration, str):
-                certainty = _answers(calibration[0], pooled, test).certainty
-                probabilities[test] = with_certainty(probabilities[test], pooled.columns[test], certainty)
+                probabilities[test] = calibration[0].probabilities(answers.rows(test))
         given = np.nan_to_num(probabilities, nan=0.0)
-        truth = np.array(self.labels)[:, np.newaxis] == np.array(pooled.classes)
-        right = pooled.right(self.labels)
+        truth = np.array(self.labels)[:, np.newaxis] == np.array(answers.classes)
+        right = answers.right(self.labels)
         curve = _bins(given, right, rate_of)
         return Reliability(
             brier=float(((given - truth) ** 2).sum(axis=1).mean()),
             calibration_error=_calibration_error(curve),
             curve=curve,
             uncalibrated_error=_calibration_error(
-                _bins(np.nan_to_num(pooled.probabilities, nan=0.0), right, rate_of)
+                _bins(np.nan_to_num(answers.probabilities, nan=0.0), right, rate_of)
             ),
         )
-
-    def _calibrations(self) -> Iterator[tuple[NDArray[np.int64], _Calibration | str]]:
-        """Yield the trials of each fold, and the calibration with the predictions of the other folds."""
-        for rows, fold_of in zip(self.groups, self.folds, strict=True):
-            for fold in np.unique(fold_of).tolist():
-                others = rows[fold_of != fold]
-                yield rows[fold_of == fold], _calibration(self.pooled, self.labels, self.instances, others)
 
 
 def _bins(

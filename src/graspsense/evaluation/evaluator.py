@@ -7,11 +7,12 @@ from functools import partial
 from typing import Any, Final
 
 import numpy as np
-from attrs import define, frozen
+from attrs import define, evolve, frozen
 
+from graspsense.core.learn.answers import Answers
 from graspsense.core.learn.labelled import Labelled, Target, class_of
 from graspsense.core.values.features import FeatureTable
-from graspsense.evaluation.crossval import ClassifierFactory, FitRefused, Groups, Pooled, cross_validate
+from graspsense.evaluation.crossval import ClassifierFactory, FitRefused, cross_validate
 from graspsense.evaluation.doubt import HeldOut
 from graspsense.evaluation.folds import (
     Folds,
@@ -38,9 +39,9 @@ class Headline:
     """
 
     protocol: str
-    pooled: Pooled
-    folds: list[Folds]
-    assign: Callable[[Sequence[str]], list[Folds]]
+    pooled: Answers
+    folds: Folds
+    assign: Callable[[Sequence[str]], Folds]
 
 
 @define(eq=False, slots=False)
@@ -59,15 +60,19 @@ class Evaluator:
         self.labels = self.trials.labels
         self.rate_among = partial(rate_among, self.trials, folds=self.k)
         self.groups = trials_by_class(self.labels, self.target)
+        """Trials that are cross-validated separately: all of them, or those of each class."""
+        self.within = np.zeros(len(self.labels), dtype=np.int64)
+        for number, rows in enumerate(self.groups):
+            self.within[rows] = number
         self._featureless = np.isnan(self.trials.table.values).all(axis=1)
         self.stratified_name = f"stratified_{self.k}_fold"
         self.held_out_name = held_out_protocol(self.trials)
-        self.pooled_by_protocol: dict[str, Pooled] = {}
+        self.pooled_by_protocol: dict[str, Answers] = {}
 
     def measure_protocols(self) -> tuple[Headline, dict[str, Measurement]]:
         """Measure the rate under each protocol. The headline holds out whole instances if that is possible."""
 
-        def assign(labels: Sequence[str]) -> list[Folds]:
+        def assign(labels: Sequence[str]) -> Folds:
             return self.assigned_folds(lambda of_group, rows: stratified(of_group, self.k, self.seed), labels)
 
         folds = assign(self.labels)
@@ -103,11 +108,11 @@ class Evaluator:
                 points.append(CurvePoint(pooled.trained_on, self.rate(pooled)))
         return tuple(points)
 
-    def rate(self, pooled: Pooled) -> RecognitionRate:
+    def rate(self, pooled: Answers) -> RecognitionRate:
         """Return the rate of these predictions."""
         return self.rate_among(pooled.right(self.labels))
 
-    def by_class(self, pooled: Pooled) -> dict[str, RecognitionRate]:
+    def by_class(self, pooled: Answers) -> dict[str, RecognitionRate]:
         """Return the rate among the trials of each class."""
         right = pooled.right(self.labels)
         rows: dict[str, list[int]] = {}
@@ -115,22 +120,17 @@ class Evaluator:
             rows.setdefault(class_of(label), []).append(i)
         return {name: self.rate_among(right, of_class) for name, of_class in sorted(rows.items())}
 
-    def unknown(self, pooled: Pooled) -> RecognitionRate:
+    def unknown(self, pooled: Answers) -> RecognitionRate:
         """Return the share of trials that the model of their fold calls unknown, or that have no feature at all."""
         return self.rate_among((pooled.unlike | self._featureless).tolist())
 
     def held_out(self, headline: Headline) -> HeldOut:
         """Return the predictions of the headline, with the instances that its folds hold out, if they hold out any."""
-        return HeldOut(
-            pooled=headline.pooled,
-            labels=self.labels,
-            instances=self.trials.instances if headline.protocol == self.held_out_name else None,
-            groups=self.groups,
-            folds=headline.folds,
-            grouped=self.trials.grouped,
-        )
+        named = headline.protocol == self.held_out_name
+        trials = self.trials if named else evolve(self.trials, instances=None)
+        return evolve(HeldOut.from_trials(trials, headline.pooled, headline.folds), within=self.within)
 
-    def by_features(self, pooled: Pooled) -> dict[str, RecognitionRate]:
+    def by_features(self, pooled: Answers) -> dict[str, RecognitionRate]:
         """Return the rates among trials with features and without any; nothing if all trials have features."""
         if not self._featureless.any():
             return {}
@@ -157,25 +157,25 @@ class Evaluator:
 
     def assigned_folds(
         self, assign: Callable[[Sequence[str], Any], Folds], labels: Sequence[str] | None = None
-    ) -> list[Folds]:
-        """Return the folds of each group, for these labels (default: those of the trials)."""
+    ) -> Folds:
+        """Return the folds of all groups, for these labels (default: those of the trials)."""
         labels = self.labels if labels is None else labels
-        return [assign([labels[i] for i in rows], rows) for rows in self.groups]
+        folds = np.full(len(labels), -1, dtype=np.int64)
+        for rows in self.groups:
+            folds[rows] = int(folds.max()) + 1 + assign([labels[i] for i in rows], rows)
+        return folds
 
     def pooled(
         self,
         name: str,
         table: FeatureTable,
-        folds: Sequence[Folds],
+        folds: Folds,
         share: float = 1.0,
         labels: Sequence[str] | None = None,
-        groups: Groups | None = None,
-    ) -> Pooled:
+    ) -> Answers:
         """Cross-validate and report progress under this name. Raises FitRefused."""
         labels = self.labels if labels is None else labels
-        groups = self.groups if groups is None else groups
-        total = sum(int(fold.max()) + 1 for fold in folds)
-        done = 0
+        total, done = len(np.unique(folds[folds >= 0])), 0
 
         def step() -> None:
             nonlocal done
@@ -184,18 +184,18 @@ class Evaluator:
                 self.progress(name, done, total)
 
         return cross_validate(
-            self.learner, table, labels, groups, folds, seed=self.seed, share=share, progress=step
+            self.learner, table, labels, folds, self.within, seed=self.seed, share=share, progress=step
         )
 
     def against(
-        self, what: str, pooled: Pooled, other: Pooled, other_name: str, rows: Sequence[int] | None = None
+        self, what: str, pooled: Answers, other: Answers, other_name: str, rows: Sequence[int] | None = None
     ) -> Measurement:
         """Return the rate of `pooled` and its difference from another protocol, on these trials (default: all)."""
         right = pooled.right(self.labels)
         by = self.difference(other.right(self.labels), right, rows)
         return Measurement(what, self.rate_among(right, rows), difference=by, difference_of=other_name)
 
-    def _instance_held_out(self, plain: Pooled) -> tuple[Headline | None, Measurement]:
+    def _instance_held_out(self, plain: Answers) -> tuple[Headline | None, Measurement]:
         what = held_out_words(self.trials, self.k)
         instances = self.trials.instances
         if instances is None:
@@ -208,7 +208,7 @@ class Evaluator:
             reason = f"labels with a single instance, which cannot be held out: {', '.join(single)}"
             return None, Measurement(what, reason=reason)
 
-        def assign(labels: Sequence[str]) -> list[Folds]:
+        def assign(labels: Sequence[str]) -> Folds:
             return self.assigned_folds(
                 lambda of_group, rows: instance_held_out(
                     of_group, [instances[i] for i in rows], self.k, self.seed

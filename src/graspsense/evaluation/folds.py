@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Final
 
 import numpy as np
@@ -14,6 +14,7 @@ from graspsense.core.learn.labelled import Labelled, Target, class_of
 from graspsense.core.values.errors import ConfigError, counted
 
 Folds = NDArray[np.int64]
+"""The number of the fold that tests each trial, -1 for a trial that takes no part."""
 
 INSTANCE_HELD_OUT: Final = "instance_held_out"
 """The name of the protocol with folds of whole instances."""
@@ -31,6 +32,22 @@ def held_out_words(trials: Labelled, k: int) -> str:
     if trials.grouped:
         return f"at most {k} folds of trials that belong together, by their values: the objects are not named"
     return f"at most {k} folds of whole instances: no model was trained on the instance that it is tested on"
+
+
+def splits(
+    folds: Folds, within: NDArray[np.int64] | None = None
+) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64]]]:
+    """Yield the trials of each fold, and those to train for it; none for a fold without any.
+
+    With `within`, only trials with the same number in it are trained for each other; they share no fold with others.
+    """
+    for fold in np.unique(folds[folds >= 0]).tolist():
+        test = np.flatnonzero(folds == fold)
+        others = (folds >= 0) & (folds != fold)
+        if within is not None:
+            others &= within == within[test[0]]
+        if others.any():
+            yield test, np.flatnonzero(others)
 
 
 def stratified(labels: Sequence[str], k: int, seed: int) -> Folds:

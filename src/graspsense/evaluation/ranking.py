@@ -246,23 +246,15 @@ def _measured(
     seed: int,
 ) -> CandidateResult:
     """Return the answers of a classifier under each protocol. Raises FitRefused."""
-    labels, groups = trials.labels, [np.arange(len(trials))]
     right, seconds, sets = {}, [], None
     for protocol, folds in protocols.items():
         began = time.perf_counter()
-        pooled = cross_validate(learner, table, labels, groups, [folds], seed=seed)
+        answers = cross_validate(learner, table, trials.labels, folds, seed=seed)
         seconds.append((time.perf_counter() - began) / (int(folds.max()) + 1))
-        right[protocol] = pooled.right(labels)
+        right[protocol] = answers.right(trials.labels)
         if sets is None:
-            held_out = HeldOut(
-                pooled=pooled,
-                labels=labels,
-                instances=exchangeable_instances(trials),
-                groups=groups,
-                folds=[folds],
-                grouped=trials.grouped,
-            )
-            sets = held_out.set_coverage(partial(rate_among, trials, folds=int(folds.max()) + 1))
+            rate_of_trials = partial(rate_among, trials, folds=int(folds.max()) + 1)
+            sets = HeldOut.from_trials(trials, answers, folds).set_coverage(rate_of_trials)
     return CandidateResult(right=right, training_s=seconds[0], sets=sets)
 
 

@@ -24,6 +24,7 @@ from graspsense.evaluation.folds import (
     held_out_words,
     in_order,
     instance_held_out,
+    splits,
     stratified,
 )
 from graspsense.evaluation.gathered_warnings import gathered_warnings
@@ -107,17 +108,15 @@ def held_out_predictions(
     Folds whose training trials are fewer than two are predicted by their mean.
     """
     predicted = np.empty(len(values))
-    numbers = np.unique(folds).tolist()
-    for done, fold in enumerate(numbers, 1):
-        test = folds == fold
-        if int((~test).sum()) < 2:
-            predicted[test] = values[~test].mean() if (~test).any() else values.mean()
+    divided = list(splits(folds))
+    for done, (test, others) in enumerate(divided, 1):
+        if len(others) < 2:
+            predicted[test] = values[others].mean()
         else:
-            predicted[test] = FittedRegression(estimator, features[~test], values[~test], seed).predict(
-                features[test]
-            )
+            fitted = FittedRegression(estimator, features[others], values[others], seed)
+            predicted[test] = fitted.predict(features[test])
         if progress is not None:
-            progress(done, len(numbers))
+            progress(done, len(divided))
     return predicted
 
 
@@ -182,8 +181,8 @@ class _Evaluator:
         """Measure what the number can be predicted from besides the squeeze."""
         folds = self.headline.folds
         mean = np.empty(len(self.values))
-        for fold in np.unique(folds).tolist():
-            mean[folds == fold] = self.values[folds != fold].mean()
+        for test, others in splits(folds):
+            mean[test] = self.values[others].mean()
         self.mean = _HeldOut("mean_only", mean, folds, self.headline.rows)
         self.controls["mean_only"] = self._against(
             "always the mean of the training trials", self.mean, self.headline
@@ -212,10 +211,8 @@ class _Evaluator:
         errors = self.headline.predicted - self.values
         inside = np.zeros(len(errors), dtype=np.bool_)
         radii = np.empty(len(errors))
-        for fold in np.unique(self.headline.folds).tolist():
-            test = self.headline.folds == fold
-            others = np.flatnonzero(~test)
-            predicted = self.headline.predicted
+        predicted = self.headline.predicted
+        for test, others in splits(self.headline.folds):
             calibrated = intervals_of(predicted[others], errors[others], self._instances_of(others.tolist()))
             if calibrated.reason:
                 return IntervalCoverage(asked=COVERAGE, unit=unit, reason=calibrated.reason)

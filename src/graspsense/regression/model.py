@@ -31,6 +31,7 @@ from graspsense.core.learn.training import training_provenance
 from graspsense.core.values.errors import ConfigError, DataDamaged, counted
 from graspsense.core.values.features import FeatureTable, misfit
 from graspsense.core.values.json_values import json_ready
+from graspsense.evaluation.folds import splits
 from graspsense.regression.estimators import ESTIMATORS, FittedRegression
 from graspsense.regression.evaluate import held_out_folds, held_out_predictions
 from graspsense.regression.intervals import PredictionIntervals, intervals_from, intervals_of
@@ -155,9 +156,8 @@ def train_regression(
         folds = held_out_folds(labelled, min(FOLDS, len(values)), seed)
         predicted = held_out_predictions(estimator, labelled.table.values, values, folds, seed)
         outside = np.empty(len(values))
-        for fold in np.unique(folds).tolist():
-            known, test = (labelled.table.rows(which) for which in (folds != fold, folds == fold))
-            outside[folds == fold] = _novelty(known).outside(test)
+        for test, others in splits(folds):
+            outside[test] = _novelty(labelled.table.rows(others)).outside(labelled.table.rows(test))
         intervals = intervals_of(predicted, predicted - values, labelled.instances, outside)
     except ConfigError as error:
         intervals = PredictionIntervals(reason=str(error))

@@ -31,6 +31,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from attrs import evolve, frozen
 
+from graspsense.core.learn.answers import Answers
 from graspsense.core.learn.stored_values import StoredValues
 
 if TYPE_CHECKING:
@@ -97,6 +98,10 @@ class LabelShare:
     high: float
 
 
+_EVERY_LABEL: Final = LabelShare(share=1.0, low=1.0, high=1.0)
+"""The share where those of single labels are not known."""
+
+
 def _applied(rate: float, share: float) -> float:
     """Return the rate of a label with this share, of that of all labels."""
     return 1.0 - (1.0 - rate) / share if share > 1.0 else rate * share
@@ -126,44 +131,34 @@ class Certainty:
         numbers = np.searchsorted(np.array(bounds) - _ROUNDING, np.nan_to_num(support, nan=0.0), side="right")
         return np.asarray(numbers, dtype=np.int64)
 
-    def rate(
-        self, probability: NDArray[np.float64], support: NDArray[np.float64], labels: Sequence[str]
-    ) -> NDArray[np.float64]:
-        """Return the rate of right answers with this probability, support and label; NaN where it is not known."""
-        steps, shares = self._steps(probability, support), self._of_labels(labels)
-        return np.array([_applied(rate, own.share) for (rate, _), own in zip(steps, shares, strict=True)])
+    def rate(self, answers: Answers) -> NDArray[np.float64]:
+        """Return the rate of right answers that are as likely, with the same label; NaN where it is not known."""
+        return self.bounds(answers)[:, 1]
 
-    def intervals(
-        self, probability: NDArray[np.float64], support: NDArray[np.float64], labels: Sequence[str]
-    ) -> list[tuple[float, float] | None]:
-        """Return the 95 % interval of the rate of each answer; None where it was not kept."""
-        steps = self._steps(probability, support)
-        return [
-            interval
-            and (
-                min(_applied(interval[0], of_label.share), _applied(rate, of_label.low)),
-                max(_applied(interval[1], of_label.share), _applied(rate, of_label.high)),
-            )
-            for (rate, interval), of_label in zip(steps, self._of_labels(labels), strict=True)
-        ]
+    def bounds(self, answers: Answers) -> NDArray[np.float64]:
+        """Return the rate of each answer between the ends of its 95 % interval, shape (trials, 3).
 
-    def _steps(
-        self, probability: NDArray[np.float64], support: NDArray[np.float64]
-    ) -> list[tuple[float, tuple[float, float] | None]]:
-        """Return the rate of each answer, of all labels together, and its interval, None where it was not kept."""
-        steps = []
-        for k, value in zip(self.class_of(support).tolist(), probability.tolist(), strict=True):
+        All are NaN where the rate is not known, and the ends where they were not kept.
+        """
+        result = np.full((len(answers.columns), 3), np.nan)
+        numbers, shares = self.class_of(answers.support).tolist(), answers.shares.tolist()
+        for i, (k, value, label) in enumerate(zip(numbers, shares, answers.predicted, strict=True)):
+            own = _EVERY_LABEL if self.of_label is None else self.of_label.get(label)
+            if own is None:
+                continue
             of_class = self.classes[k]
             step = bisect_right(of_class.probabilities, value + _ROUNDING, lo=1) - 1
-            steps.append((of_class.rates[step], of_class.intervals[step] if of_class.intervals else None))
-        return steps
+            rate = of_class.rates[step]
+            result[i, 1] = _applied(rate, own.share)
+            if of_class.intervals:
+                low, high = of_class.intervals[step]
+                result[i, 0] = min(_applied(low, own.share), _applied(rate, own.low))
+                result[i, 2] = max(_applied(high, own.share), _applied(rate, own.high))
+        return result
 
-    def _of_labels(self, labels: Sequence[str]) -> list[LabelShare]:
-        """Return the share of each of these labels; NaN for one that was too seldom the answer."""
-        if self.of_label is None:
-            return [LabelShare(share=1.0, low=1.0, high=1.0)] * len(labels)
-        unknown = LabelShare(share=math.nan, low=math.nan, high=math.nan)
-        return [self.of_label.get(label, unknown) for label in labels]
+    def probabilities(self, answers: Answers) -> NDArray[np.float64]:
+        """Return the probabilities of all labels, of which that of the predicted one is its rate."""
+        return with_certainty(answers.probabilities, answers.columns, self.rate(answers))
 
     def to_json(self) -> dict[str, Any]:
         """Return its entries in the file of a model, as values that JSON represents exactly."""
@@ -234,31 +229,26 @@ def _shares_from(kept: StoredValues) -> dict[str, LabelShare]:
 
 
 def certainty_of(
-    probability: NDArray[np.float64],
-    support: NDArray[np.float64],
-    labels: Sequence[str],
-    right: Sequence[bool],
-    units: Sequence[str],
-    effect: float = 1.0,
+    answers: Answers, right: Sequence[bool], units: Sequence[str], effect: float = 1.0
 ) -> Certainty:
     """Return the certainty that held-out answers give; at least one.
 
-    `probability` and `support` are those of `labels`, the predicted ones. The trials of each unit weigh as much.
-    `effect` is by how much the variance of their rates is larger than that of independent answers.
+    The trials of each unit weigh as much. `effect` is by how much the variance of their rates is larger than that of
+    independent answers.
     """
     _, unit_of, trials_of_unit = np.unique(np.array(units), return_inverse=True, return_counts=True)
     weights = 1.0 / trials_of_unit[unit_of]
-    known = np.nan_to_num(support, nan=0.0)
-    answers = np.array(right, dtype=np.float64)
-    effect *= _alike(np.bincount(unit_of, weights * answers).astype(np.float64))
+    known, labels = np.nan_to_num(answers.support, nan=0.0), np.array(answers.predicted)
+    correct = np.array(right, dtype=np.float64)
+    effect *= _alike(np.bincount(unit_of, weights * correct).astype(np.float64))
     least_units = max(STEP_UNITS, STEP_SHARE * float(weights.sum()))
-    guessing = 1.0 / max(len(set(labels)), 2)
+    guessing = 1.0 / max(len(set(labels.tolist())), 2)
     edges = [0.0, *_begins(known, weights, SUPPORT_BOUNDS, CLASS_UNITS), np.inf]
     classes = []
     for least, end in pairwise(edges):
         rows = (known >= least) & (known < end)
         begins, rates, intervals = _steps(
-            probability[rows], answers[rows], weights[rows], least_units, effect, guessing
+            answers.shares[rows], correct[rows], weights[rows], least_units, effect, guessing
         )
         classes.append(
             SupportClass(
@@ -270,8 +260,7 @@ def certainty_of(
             )
         )
     of_all = Certainty(classes=tuple(classes))
-    promised = of_all.rate(probability, support, labels)
-    return evolve(of_all, of_label=_shares(np.array(labels), answers, promised, weights / effect, effect))
+    return evolve(of_all, of_label=_shares(labels, correct, of_all.rate(answers), weights / effect, effect))
 
 
 def _alike(of_unit: NDArray[np.float64]) -> float:
@@ -386,8 +375,9 @@ def _steps(
     right_in, units = (
         np.asarray(np.bincount(level_of, counts), dtype=np.float64) / effect for counts in (right_of, all_of)
     )
-    rates = (units * _drawn_together(right_in, units, len(all_of), guessing) + 1.0) / (units + 2.0)
-    rates = np.maximum.accumulate(rates)
+    drawn = np.maximum(_drawn_together(right_in, units, len(all_of), guessing), guessing)
+    # Two answers more, one of them right, leave none certain; they make no guess among several labels surer.
+    rates = np.maximum.accumulate(np.minimum((units * drawn + 1.0) / (units + 2.0), drawn))
     ends = (betaincinv(rates * (units + 2.0), (1.0 - rates) * (units + 2.0), end) for end in (0.025, 0.975))
     begins = (edges[number] for number in first_of.tolist())
     return tuple(begins), tuple(rates.tolist()), tuple(zip(*(end.tolist() for end in ends), strict=True))

@@ -68,7 +68,7 @@ def parts_of_clumps(values: Values, labels: Sequence[str], copies: Numbers) -> N
     apart[copies[0], copies[1]] = apart[copies[1], copies[0]] = np.inf
     # A coarse feature puts trials on a lattice, and copies lie at equal distances from others: both make gaps.
     fine = all(2 * len(np.unique(column)) > len(values) for column in values.T)
-    repeated = _repeated(apart, np.bincount(codes)[codes]) if fine and not copies.size else 0
+    repeated = _repeated(apart, codes) if fine and not copies.size else 0
     if not repeated and not _in_clumps(values, codes, apart):
         return None
     part_of = np.zeros(len(codes), dtype=np.int64)
@@ -79,21 +79,22 @@ def parts_of_clumps(values: Values, labels: Sequence[str], copies: Numbers) -> N
     return codes * len(codes) + part_of
 
 
-def _repeated(apart: Values, of_label: Numbers) -> int:
+def _repeated(apart: Values, codes: Numbers) -> int:
     """Return how many others are of the same one as each trial, by the gap behind them; 0 if there is none.
 
-    `of_label` has the number of trials with the label of each one. Labels that are far from each other have a gap too,
-    so that only those count whose trials may be of several.
+    Only trials of the same label are compared, and those of labels whose trials may be of several: others of another
+    label that lie between hide the gap, and labels that are far from each other have one too.
     """
-    near = np.clip(np.sort(apart, axis=1)[:, : _MOST_REPEATED + 2], NEAREST, 1.0 / NEAREST)
-    places = np.arange(1, near.shape[1])
-    gaps = places * np.diff(np.log(near), axis=1)
+    of_label = np.bincount(codes)[codes]
+    near = np.sort(np.where(codes[:, np.newaxis] == codes, apart, np.inf), axis=1)[:, : _MOST_REPEATED + 2]
+    near = np.where(np.isinf(near), np.nan, np.clip(near, NEAREST, 1.0 / NEAREST))
+    gaps = np.arange(1, near.shape[1]) * np.diff(np.log(near), axis=1)
     # Two trials that are next to each other have about the same distances, so that they count as one.
     wider = [0.0]
     for others in range(1, min(_MOST_REPEATED, len(apart) // _FEWEST_REPEATED) + 1):
         judged = gaps[of_label >= _FEWEST_REPEATED * (others + 1) // 2]
-        beyond = judged[:, others - 1] - np.delete(judged, others - 1, axis=1).mean(axis=1)
         wide = len(judged) >= _FEWEST_REPEATED * others
+        beyond = judged[:, others - 1] - np.nanmean(np.delete(judged, others - 1, axis=1), axis=1)
         wider.append(
             math.sqrt(len(judged) / 2.0) * beyond.mean() / max(beyond.std(), NEAREST) if wide else 0.0
         )

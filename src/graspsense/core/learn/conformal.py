@@ -20,12 +20,15 @@ The scores are cross-validated, but the prediction is by the model of all trials
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from attrs import frozen
 
+from graspsense.core.learn.answers import Answers
+from graspsense.core.learn.certainty import Certainty
 from graspsense.core.learn.stored_values import StoredValues
 
 if TYPE_CHECKING:
@@ -40,8 +43,6 @@ COVERAGES: Final = (0.01, 0.999)
 UNITS: Final = ("instances", "sessions", "groups", "trials")
 """What is held out: named objects, sessions, trials that belong together (`learn.groups`), or single trials."""
 _ROUNDING: Final = 1e-9
-_CLOSENESS: Final = 1e-3
-"""Weight of the closeness in a score: it only matters among probabilities that are equal, or almost."""
 NEVER_REACHED: Final = 2.0
 """The score of the predicted label, which is always a member: larger than those of all other labels."""
 
@@ -63,29 +64,32 @@ def units_lacking(
 ) -> tuple[str, dict[str, int]]:
     """Return the unit of exchangeability, and how many more units each label needs for a threshold of its own.
 
-    `counts` are the trials of each label and instance. The unit is `instances` if every trial has one and every label
-    has several, else `trials`.
+    `counts` are the trials of each label and instance. The unit is `instances` if every trial has one and they can be
+    held out, else `trials`.
 
     >>> units_lacking({("full", "full#1"): 5, ("full", "full#2"): 5})
     ('instances', {'full': 7})
     >>> units_lacking({("full", None): 5})
     ('trials', {'full': 4})
     """
-    named: dict[str, set[str | None]] = {}
-    trials: dict[str, int] = {}
-    for (label, instance), n in counts.items():
-        named.setdefault(label, set()).add(instance)
-        trials[label] = trials.get(label, 0) + n
-    by_instance = all(None not in instances and len(instances) > 1 for instances in named.values())
-    have = {label: len(instances) for label, instances in named.items()} if by_instance else trials
+    trials: Counter[str] = Counter()
+    for (label, _), n in counts.items():
+        trials[label] += n
+    by_instance = can_be_held_out(counts) and all(instance is not None for _, instance in counts)
+    have = Counter(label for label, _ in counts) if by_instance else trials
     needed = units_needed(coverage)
     lacking = {label: max(needed - n, 0) for label, n in sorted(have.items())}
     return ("instances" if by_instance else "trials"), lacking
 
 
-def scores_of(probabilities: NDArray[np.float64], closeness: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the scores of trials for labels, of the probabilities and of `Novelty.closeness` (0 to 1)."""
-    return probabilities + _CLOSENESS * closeness
+def can_be_held_out(named: Iterable[tuple[str, str | None]]) -> bool:
+    """Return whether whole instances can be held out, of these different pairs of a label and an instance.
+
+    Most labels need several. The only one of a label is held out as well: no model knows the label then, and how often
+    it is recognised is not known.
+    """
+    of_label = Counter(label for label, _ in named)
+    return 2 * sum(instances > 1 for instances in of_label.values()) > len(of_label)
 
 
 @frozen(kw_only=True)
@@ -98,20 +102,6 @@ class LabelThreshold:
 
     score: float | None
     units: int
-
-
-@frozen(kw_only=True, eq=False)
-class Answers:
-    """What sets are made of, for some trials: the scores of all labels, and what the predictions rest on.
-
-    `scores` has shape (trials, classes), NaN for a label that is not possible. `predicted` has the columns of the
-    predicted labels, `certainty` how certain they are (NaN: not known), `support_class` their class of support.
-    """
-
-    scores: NDArray[np.float64]
-    predicted: NDArray[np.int64]
-    certainty: NDArray[np.float64]
-    support_class: NDArray[np.int64]
 
 
 @frozen(kw_only=True)
@@ -131,29 +121,26 @@ class PredictionSets:
     unknown: int = 0
     trials: int = 0
 
-    def members(self, answers: Answers, classes: Sequence[str]) -> NDArray[np.bool_]:
+    def members(self, answers: Answers, certainty: Certainty) -> NDArray[np.bool_]:
         """Return which classes belong to the set of each trial, of the shape of the scores.
 
         A label without a threshold, which no calibration trial had, is a member like one with too few units.
         """
         scores = answers.scores
-        inside = np.zeros(scores.shape, dtype=np.bool_)
-        of_support = np.array(self.of_support)[answers.support_class]
-        for k, name in enumerate(classes):
-            own = self.thresholds[name].score if name in self.thresholds else None
-            least = np.minimum(of_support, -math.inf if own is None else own) - _ROUNDING
-            inside[:, k] = scores[:, k] >= least
-        rows = np.arange(len(inside))
-        inside[rows, answers.predicted] = True
+        own = [self.thresholds[name].score if name in self.thresholds else None for name in answers.classes]
+        of_label = np.array([-math.inf if score is None else score for score in own])
+        of_support = np.array(self.of_support)[certainty.class_of(answers.support)]
+        inside = scores >= np.minimum(of_support[:, np.newaxis], of_label) - _ROUNDING
+        inside[np.arange(len(inside)), answers.columns] = True
         alone = np.flatnonzero(
             (inside.sum(axis=1) == 1)
-            & ~(answers.certainty >= self.coverage)
+            & ~(certainty.rate(answers) >= self.coverage)
             & ((~np.isnan(scores)).sum(axis=1) > 1)
         )
         others = np.where(np.isnan(scores), -np.inf, scores)[alone]
-        others[np.arange(len(alone)), answers.predicted[alone]] = -np.inf
+        others[np.arange(len(alone)), answers.columns[alone]] = -np.inf
         inside[alone, others.argmax(axis=1) if len(alone) else alone] = True
-        return inside
+        return np.asarray(inside)
 
     @property
     def uncalibrated(self) -> tuple[str, ...]:
@@ -214,35 +201,35 @@ def sets_from(kept: StoredValues, classes: Sequence[str], support_classes: int) 
 
 def sets_of(
     answers: Answers,
-    truth: NDArray[np.int64],
-    classes: Sequence[str],
+    labels: Sequence[str],
     instances: Sequence[str] | None,
+    certainty: Certainty,
     coverage: float = COVERAGE,
 ) -> PredictionSets:
     """Return the sets that held-out trials calibrate.
 
-    `answers` are by models that were trained without the instance of the trial, `truth` the columns of the true
-    labels. Without `instances`, each trial is a unit.
+    `answers` are by models that were trained without the instance of the trial, `labels` the true labels. Without
+    `instances`, each trial is a unit. `certainty` has the classes of support.
     """
-    unit = "trials" if instances is None else "instances"
+    unit, truth = "trials" if instances is None else "instances", answers.columns_of(labels)
     units = np.array([str(i) for i in range(len(truth))] if instances is None else instances)
     needed = units_needed(coverage)
     scores = answers.scores[np.arange(len(truth)), truth]
-    scores = np.where(answers.predicted == truth, NEVER_REACHED, scores)
+    scores = np.where(answers.columns == truth, NEVER_REACHED, scores)
     thresholds = {}
     for k in np.unique(truth).tolist():
         rows = truth == k
         of_label = len(np.unique(units[rows]))
         score = calibrated_threshold(scores[rows], units[rows], coverage) if of_label >= needed else None
-        thresholds[classes[k]] = LabelThreshold(score=score, units=of_label)
+        thresholds[answers.classes[k]] = LabelThreshold(score=score, units=of_label)
     if all(threshold.score is None for threshold in thresholds.values()):
         most = max((threshold.units for threshold in thresholds.values()), default=0)
         reason = f"a label has at most {most} calibration {unit}, and {100 * coverage:.0f} % needs {needed}"
         return PredictionSets(coverage=coverage, unit=unit, thresholds={}, reason=reason)
-    numbers = range(int(answers.support_class.max()) + 1)
+    support_class = certainty.class_of(answers.support)
     of_support = [
         calibrated_threshold(scores[rows], units[rows], coverage)
-        for rows in (answers.support_class == number for number in numbers)
+        for rows in (support_class == number for number in range(int(support_class.max()) + 1))
     ]
     return PredictionSets(
         coverage=coverage,

@@ -38,10 +38,12 @@ def confounded(labelled: Labelled) -> str:
                 f"all trials of a label have the same {name}: which of both is recognised cannot be told. Record each "
                 f"label with several; a feature can be left out ({option('features', python='columns')})"
             )
-    if in_stretches(labelled) and _drifts(labelled):
+    named = labelled.instances is not None and not labelled.grouped
+    if in_stretches(labelled) and (not named or _drifts(labelled)):
         return (
-            "each label was recorded in one stretch while the features drifted: which of both is recognised cannot be "
-            f"told. Record the labels in turns, or state the order ({option('order', 'COLUMN')})"
+            "each label was recorded in one stretch: whether it is recognised by its object, or by what changed from "
+            "one stretch to the next, as a drift or a mounting, cannot be told. Record the labels in turns"
+            + ("" if named else f", or name several objects of each ({option('instance', 'COLUMN')})")
         )
     return ""
 

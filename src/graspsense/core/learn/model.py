@@ -12,9 +12,10 @@ from attrs import evolve, frozen
 
 from graspsense.core.components.entries import TABLE_OF_ROLE
 from graspsense.core.components.setting import CHANGES_NO_RESULT, NAMES_INPUT, settings_marked, worded
-from graspsense.core.learn.certainty import LABEL_UNITS, Certainty, with_certainty
-from graspsense.core.learn.conformal import Answers, PredictionSets, scores_of
-from graspsense.core.learn.novelty import REACH, Novelty
+from graspsense.core.learn.answers import Answers, answers_of
+from graspsense.core.learn.certainty import LABEL_UNITS, Certainty
+from graspsense.core.learn.conformal import PredictionSets
+from graspsense.core.learn.novelty import Novelty
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.core.values.features import (
     LARGEST_VALUE,
@@ -139,7 +140,9 @@ class Model:
                 refuse_improbable(shares, 1, len(classes))
             warnings = (*explained.warnings, *warnings)
             strange = self.novelty.unlike(chosen)
-            (prediction,) = self._calibrated(bounded, [explained.label], shares, bool(differences))
+            columns = np.array([classes.index(explained.label)])
+            answers = answers_of(self.novelty, table, classes, shares, columns, self.support(bounded))
+            (prediction,) = self._calibrated(table, answers, bool(differences))
             if strange is None:
                 return evolve(
                     prediction,
@@ -152,7 +155,7 @@ class Model:
             probabilities = prediction.probabilities
             because = (strange,)
             if not all(math.isnan(value) for value in chosen.values):
-                because = (strange, f"of the known labels, the nearest is {prediction.label}")
+                because = (strange, f"of the known labels, the nearest is {explained.label}")
         return Prediction(
             label=UNKNOWN,
             probabilities=probabilities,
@@ -167,63 +170,47 @@ class Model:
         """Return the predictions of many trials in one call, without reasons. Raises what `answers` raises."""
         differences = tuple(self.differences(provenance=provenance))
         warnings = (*self._kind_warnings(differences), *differences)
-        labels, shares = self.answers(table)
-        made = self._calibrated(table.columns(self.names), labels, shares, bool(differences))
+        made = self._calibrated(table.columns(self.names), self.answers(table), bool(differences))
         return [
             evolve(prediction, warnings=warnings, model=self.in_a_line, holds_for=self.holds_for)
             for prediction in made
         ]
 
-    def _calibrated(
-        self, table: FeatureTable, labels: Sequence[str], shares: NDArray[np.float64], elsewhere: bool
-    ) -> list[Prediction]:
+    def _calibrated(self, table: FeatureTable, answers: Answers, elsewhere: bool) -> list[Prediction]:
         """Return predictions with certainty and sets, without reasons; those of unknown trials have no set.
 
-        `shares` are the probabilities that the classifier gives. With `elsewhere`, the trials are not of the kind that
-        the model was measured on, and nothing is calibrated; nor is a trial for which that does not hold.
+        With `elsewhere`, the trials are not of the kind that the model was measured on, and nothing is calibrated; nor
+        is a trial for which that does not hold.
         """
-        classes = self.classifier.classes()
-        known = np.array([label != UNKNOWN for label in labels])
-        predicted = shares.argmax(axis=1)
-        predicted[known] = [classes.index(label) for label in labels if label != UNKNOWN]
+        classes, columns, shares = answers.classes, answers.columns, answers.probabilities
+        unlike = answers.unlike
+        known = ~unlike
         no_certainty = "it was not measured under these settings" if elsewhere else self.no_certainty
         unmeasured = self.novelty.unmeasured(
             table, math.inf if self.certainty is None else self.certainty.reach
         )
         probabilities, members = shares, np.zeros(shares.shape, dtype=np.bool_)
-        intervals: Sequence[tuple[float, float] | None] = [None] * len(table)
+        intervals: list[tuple[float, float] | None] = [None] * len(table)
         if self.certainty is not None and not no_certainty:
-            support = self.support(table)
-            share = shares[np.arange(len(table)), predicted]
-            answered = [classes[k] for k in predicted.tolist()]
-            certainty = self.certainty.rate(share, support, answered)
-            kept = self.certainty.intervals(share, support, answered)
             measured = np.array([not why for why in unmeasured])
             known &= measured
-            calibrated = with_certainty(shares, predicted, certainty)
+            calibrated = self.certainty.probabilities(answers)
             probabilities = np.where(measured[:, np.newaxis], calibrated, shares)
             # No answer counts as less certain than chance, however seldom such answers were right.
-            own = calibrated[np.arange(len(table)), predicted].tolist()
+            own = calibrated[np.arange(len(table)), columns].tolist()
             intervals = [
-                interval and (min(interval[0], sure), max(interval[1], sure))
-                for interval, sure in zip(kept, own, strict=True)
+                None if math.isnan(low) else (min(low, sure), max(high, sure))
+                for (low, _, high), sure in zip(self.certainty.bounds(answers).tolist(), own, strict=True)
             ]
             if self.sets is not None and self.sets.thresholds:
-                scores = scores_of(shares, self.novelty.closeness(table, classes))
-                answers = Answers(
-                    scores=scores,
-                    predicted=predicted,
-                    certainty=certainty,
-                    support_class=self.certainty.class_of(support),
-                )
-                members[known] = self.sets.members(answers, classes)[known]
+                members[known] = self.sets.members(answers.rows(known), self.certainty)
         made = []
-        for i, label in enumerate(labels):
-            order = sorted(np.flatnonzero(members[i]), key=lambda k: (k != predicted[i], -scores[i, k]))
-            without = no_certainty or unmeasured[i] or self._why_uncertain(classes[predicted[i]])
+        for i, nearest in enumerate(answers.predicted):
+            order = sorted(np.flatnonzero(members[i]), key=lambda k: (k != columns[i], -answers.scores[i, k]))
+            without = no_certainty or unmeasured[i] or self._why_uncertain(nearest)
             made.append(
                 Prediction(
-                    label=label,
+                    label=UNKNOWN if unlike[i] else nearest,
                     probabilities=dict(zip(classes, probabilities[i].tolist(), strict=True)),
                     because=(),
                     prediction_set=tuple(classes[k] for k in order),
@@ -242,26 +229,22 @@ class Model:
         unit = "trials" if self.sets is None else self.sets.unit
         return f"fewer than {LABEL_UNITS} held-out {unit} were called {label}"
 
-    def answers(self, table: FeatureTable) -> tuple[list[str], NDArray[np.float64]]:
-        """Return the label of `predict` for each trial of a table, and the probabilities that the classifier gives.
+    def answers(self, table: FeatureTable) -> Answers:
+        """Return the answers for the trials of a table, which are not calibrated.
 
-        The probabilities are not calibrated. Their shape is (trials, classes), in the order of the classes of the
-        classifier; unknown trials have probabilities too. Raises ConfigError if the table does not have the features of
+        Their classes are in the order of the classifier. Raises ConfigError if the table does not have the features of
         the model, DataDamaged if the classifier gives no probabilities.
         """
         misfit = self.misfit(table)
         if misfit:
             raise ConfigError(misfit)
-        chosen = table.columns(self.names)
+        chosen, classes = table.columns(self.names), self.classifier.classes()
         shares = self.classifier.probabilities(_bounded(chosen))
         with self._usable():
-            refuse_improbable(shares, len(table), len(self.classifier.classes()))
-        unlike = (self.novelty.outside(chosen) > REACH).tolist()
-        classes = self.classifier.classes()
+            refuse_improbable(shares, len(table), len(classes))
         # Probabilities that differ by rounding count as equal: the first of them is the answer.
-        best = np.argmax(shares >= shares.max(axis=1, keepdims=True) - EQUAL, axis=1).tolist()
-        labels = [UNKNOWN if strange else classes[k] for strange, k in zip(unlike, best, strict=True)]
-        return labels, shares
+        best = np.argmax(shares >= shares.max(axis=1, keepdims=True) - EQUAL, axis=1)
+        return answers_of(self.novelty, chosen, classes, shares, best, self.support(_bounded(chosen)))
 
     @property
     def no_certainty(self) -> str:

@@ -72,11 +72,14 @@ def early(params: Mapping[str, Any], seed: int) -> RecognitionResult:
         suffix = f", {name}" if len(params["learners"]) > 1 else ""
         for target in early_settings.targets:
             true = target_labels(data.labels, target)
-            groups = trials_by_class(data.labels, target)
-            folds = [stratified([true[i] for i in rows], FOLDS, seed) for rows in groups]
+            folds = np.empty(len(true), dtype=np.int64)
+            within = folds.copy()
+            for number, of_class in enumerate(trials_by_class(data.labels, target)):
+                folds[of_class] = FOLDS * number + stratified([true[i] for i in of_class], FOLDS, seed)
+                within[of_class] = number
             for moment, features in rows.items():
                 table = table_of(features)
-                predicted = cross_validate(learner, table, true, groups, folds, seed=seed).predicted
+                predicted = cross_validate(learner, table, true, folds, within, seed=seed).predicted
                 cost = float(np.mean(used_s[moment]))
                 results.append(
                     ClassifierResult.from_answers(
