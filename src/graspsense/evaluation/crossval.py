@@ -90,7 +90,7 @@ def cross_validate(
         columns=predicted,
         support=support,
         outside=outside,
-        folds=max(len(np.unique(of_group)) for of_group in groups),
+        folds=max(len(np.unique(of_group[of_group >= 0])) for of_group in groups),
         trained_on=float(np.mean(sizes)),
     )
 
