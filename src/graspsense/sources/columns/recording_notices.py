@@ -6,6 +6,7 @@ Ranges are without glitches. The noise of a force is its usual second difference
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from functools import cached_property
 from itertools import pairwise
@@ -185,6 +186,11 @@ def _course(values: Numbers, longest: int) -> Numbers:
     return np.median(np.lib.stride_tricks.sliding_window_view(around, 2 * longest + 1), axis=1)
 
 
+def _mean(values: Numbers, width: int) -> Numbers:
+    """Return the mean of values over an odd number of samples around each."""
+    return np.convolve(np.pad(values, width // 2, mode="edge"), np.full(width, 1.0 / width), mode="valid")
+
+
 def _leap(steps: Numbers, within: NDArray[np.bool_], least: float) -> int | None:
     """Return the sample to which a signal leaps: by more than this, and than elsewhere; None if it does not."""
     k = int(np.argmax(steps * within))
@@ -266,14 +272,19 @@ def _numb(pad: _Force, other: _Force) -> Iterator[str]:
 
     One that touches the object late does so for a while; one that felt it before and feels it again had failed.
     """
-    span, noise = float(np.ptp(other.n)), max(pad.noise, other.noise)
-    loaded = other.n > other.low + LOADED * span
-    begin = int(loaded.argmax())
-    free = other.n[:begin] < other.low + PART * span
-    if not free.any() or not span > noise:
+    span, noise = other.span, max(pad.noise, other.noise)
+    if not other.span > 0.0:
         return
-    zero = float(np.median(pad.n[:begin][free]))
-    away = np.abs(pad.n - zero)
+    # The mean of so many samples tells a load from the noise of single ones.
+    width = 2 * int(0.5 * (noise / (FREE * span)) ** 2) + 1
+    felt_n, other_n = _mean(pad.n, width), _mean(other.n, width)
+    loaded = other_n > other.low + LOADED * span
+    begin, noise = int(loaded.argmax()), noise / math.sqrt(width)
+    free = other_n[:begin] < other.low + PART * span + noise
+    if not free.any() or width > np.count_nonzero(loaded):
+        return
+    zero = float(np.median(felt_n[:begin][free]))
+    away = np.abs(felt_n - zero)
     loaded &= pad.gap <= pad.gap[begin]
     numb, felt = loaded & (away < max(noise, SLIGHT * span)), np.flatnonzero(away > FREE * span)
     if np.count_nonzero(numb) < max(FEWEST, PART * np.count_nonzero(loaded)):
@@ -283,7 +294,7 @@ def _numb(pad: _Force, other: _Force) -> Iterator[str]:
         from_k, until_k = np.flatnonzero(numb)[[0, -1]].tolist()
         yield (
             f"{pad.what} stays at {pad.amount(zero)} from {pad.t[from_k]:.4g} to {pad.when(until_k)}, while the other "
-            f"pad feels up to {other.n[numb].max():.3g}: does its fingertip not answer, or did one finger alone touch?"
+            f"pad feels up to {other_n[numb].max():.3g}: does its fingertip not answer, or did one finger alone touch?"
         )
 
 
@@ -364,9 +375,7 @@ def _rough(force: _Force) -> Iterator[str]:
     width = 2 * max(2, round(0.5 * ROUGH_S / float(np.median(np.diff(force.t))))) + 1
     if len(force) < 2 * width or not force.span > 0.0:
         return
-    around = np.pad(force.n, width // 2, mode="edge")
-    course = np.convolve(around, np.full(width, 1.0 / width), mode="valid")
-    varies = float(np.median(np.abs(force.n - course))) / force.span
+    varies = float(np.median(np.abs(force.n - _mean(force.n, width)))) / force.span
     steps = np.diff(np.unique(force.n))
     counts = steps / steps.min()
     if varies > SLIGHT:

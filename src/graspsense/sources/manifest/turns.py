@@ -1,7 +1,9 @@
-"""Whether force and gap turn together: under a load, the rate of a force changes when the fingers change their speed.
+"""Whether force and gap are of one time: a force rests when the fingers do, and turns when they turn.
 
-It does so at the same time and as sharply, since a force follows the deformation, or runs before it where an object is
-viscous. A signal that was smoothed turns slowly, and so does one where the other turns if it is of another time.
+No object presses more in a gap than when the fingers came there, so a force that grows while they rest was filtered, or
+comes late. Under a load, the rate of a force changes when the fingers change their speed. It does so at the same time
+and as sharply, since a force follows the deformation, or runs before it where an object is viscous. A signal that was
+smoothed turns slowly, and so does one where the other turns if it is of another time.
 How sharply a signal turns is its second difference over a short time, as a share of that over a time `FAR` times as
 long if it grew with the time: 1 at a kink, and 1 / `FAR` where its course is smooth.
 """
@@ -36,6 +38,15 @@ DUE: Final = 0.2
 """Share of the range of a force by which it has to turn where its mean stiffness under a load says so."""
 STEPS: Final = 3.0
 """A turn is larger than so many steps of a coarse signal."""
+STILL: Final = 0.02
+"""Share of its travel under a load within which a gap rests;"""
+STEEPER: Final = 2.0
+"""there, a force grows by so many times the share that it grew by before."""
+LATE_S: Final = 0.04
+"""A force that is larger for longer (s), and for longer than two of its values, is late."""
+_LATER: Final = (
+    "was the force smoothed, or is it of another time? A contact is then seen too early or too late"
+)
 
 
 @frozen(eq=False)
@@ -104,8 +115,7 @@ def apart(t_s: Numbers, gap: Numbers, force: Numbers) -> Iterator[str]:
     if k is not None and (far < least or FAR * near < SHARP * far * min(gaps.sharp[k], 1.0)):
         yield (
             f"the fingers change their speed at once at {clock[k + FAR * n]:.4g} s, under a load, and the rate of the "
-            "force changes slowly: was the force smoothed, or is it of another time than the gap? A contact is then "
-            "seen too early or too late"
+            f"force changes slowly: {_LATER}"
         )
         return
     k = forces.largest(pressed, (np.abs(forces.near) > least) & (np.abs(gaps.far) > gaps.unknown))
@@ -116,6 +126,39 @@ def apart(t_s: Numbers, gap: Numbers, force: Numbers) -> Iterator[str]:
             "change their speed slowly: was the gap smoothed, or is it of another time than the force? A rest is then "
             "seen too late"
         )
+
+
+def grows_at_rest(t_s: Numbers, gap: Numbers, force: Numbers) -> Iterator[str]:
+    """Yield that a force is larger while the fingers rest than when they came to this gap, by times (s)."""
+    low, high = usual_range(force)
+    course, least = _without_single(force) - low, PART * (high - low)
+    loaded = np.flatnonzero(course > LARGEST * (high - low))
+    if not len(loaded) or not np.isfinite(t_s).all():
+        return
+    free = np.flatnonzero(course < least)
+    begin = int(free[free < loaded[0]].max(initial=0))
+    held = slice(begin, int(free[free > loaded[0]].min(initial=len(t_s))))
+    t, width, n = t_s[held], _without_single(gap)[held], course[held]
+    travel = float(width[0] - width.min())
+    noise = NOISE * float(np.median(np.abs(np.diff(gap, 2))))
+    still = max(STILL * travel, noise, STEPS * (resolution(gap) or 0.0))
+    if not travel > still:
+        return
+    resting = width <= width.min() + still
+    came = float(n[: int(resting.argmax()) + 1].max())
+    more = np.flatnonzero(resting & (n > came + least + STEEPER * (high - low) * still / travel))
+    if len(more) and t[more[-1]] - t[more[0]] > max(LATE_S, 2.0 * _period_s(t_s, force)):
+        yield (
+            f"the force grows by {100 * (n[more].max() - came) / (high - low):.0f} % of its range from "
+            f"{t[resting.argmax()]:.4g} s on, while the fingers rest: {_LATER}"
+        )
+
+
+def _without_single(values: Numbers) -> Numbers:
+    """Return values without single ones that leave their course."""
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(values, 1, mode="edge"), 3)
+    course: Numbers = np.median(around, axis=1)
+    return course
 
 
 def _period_s(t_s: Numbers, signal: Numbers) -> float:
