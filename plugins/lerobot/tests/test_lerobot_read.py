@@ -101,6 +101,13 @@ ALL, GAP, SECOND_FINGER = slice(None), 1, slice(15, None)
         ({"fps": 60}, "fps=60", "fps", 90),
         ({"states": [np.repeat(episode(), 2, axis=0)]}, "repeated=drop", "repeated=drop", 90),
         ({"states": [changed(ALL, GAP, lambda gap: 100.0 - gap)]}, "", "gap_m_per_unit=-", None),
+        ({"states": [changed(ALL, GAP, 40.0)]}, "", "gap=NAME", None),
+        (
+            {"states": [changed(ALL, slice(3, None), lambda cells: np.roll(cells, 15, axis=0))]},
+            "",
+            "rest:",
+            None,
+        ),
         ({"states": [changed(10, GAP, np.nan)]}, "", "without a number", 89),
         ({"states": [changed(10, GAP, np.inf)]}, "", "without a number", 89),
         ({"states": [changed(ALL, SECOND_FINGER, np.nan)]}, "", "without a number", None),

@@ -15,7 +15,7 @@ from graspsense.sources.columns.grasp_columns import GraspColumns
 from graspsense.sources.columns.recording_notices import FEWEST, PART, ZERO_SAMPLES, force_of_pads
 from graspsense.sources.manifest.closings import CLOSED, OPEN
 from graspsense.sources.manifest.steps import NOISE, squeezes
-from graspsense.sources.manifest.turns import apart, grows_at_rest
+from graspsense.sources.manifest.turns import timing_notices
 
 if TYPE_CHECKING:
     from graspsense.sources.formats.table import Numbers
@@ -74,11 +74,7 @@ def notices_of(columns: GraspColumns, keys: Manifest) -> Iterator[str]:
     yield from _of_time(columns, divided=keys.split == "force")
     if _is_felt(columns.force_n):
         yield from _of_holes(columns)
-        if not {"t", "gap"} & {name for name, unit in columns.units.items() if unit}:
-            t_s, gap = columns.t_s, columns.gap_m
-            pads = force_of_pads(columns.left_n, columns.right_n).values()
-            late = [text for pad in pads for text in grows_at_rest(t_s, gap, pad)][:1]
-            yield from late or apart(t_s, gap, columns.force_n)
+        yield from timing_notices(columns)
 
 
 def falls_on_closing(columns: GraspColumns) -> str:

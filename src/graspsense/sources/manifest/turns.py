@@ -18,7 +18,8 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 from graspsense.sources.columns.channel_facts import resolution, usual_range
-from graspsense.sources.columns.recording_notices import PART
+from graspsense.sources.columns.grasp_columns import GraspColumns
+from graspsense.sources.columns.recording_notices import PART, SLIGHT, force_of_pads
 from graspsense.sources.formats.table import Numbers
 from graspsense.sources.manifest.steps import NOISE
 
@@ -41,7 +42,9 @@ STEPS: Final = 3.0
 STILL: Final = 0.02
 """Share of its travel under a load within which a gap rests;"""
 STEEPER: Final = 2.0
-"""there, a force grows by so many times the share that it grew by before."""
+"""there, a force grows by so many times the share that it grew by before,"""
+GROWS: Final = 0.15
+"""and by this share of its range as its sensor creeps."""
 LATE_S: Final = 0.04
 """A force that is larger for longer (s), and for longer than two of its values, is late."""
 _LATER: Final = (
@@ -89,6 +92,18 @@ class _Turns:
         return float(np.abs(self.near[part]).max()), float(np.abs(self.far[part]).max())
 
 
+def timing_notices(columns: GraspColumns) -> Iterator[str]:
+    """Yield what tells that gap and force of a grasp are not of one time."""
+    if columns.units.get("t"):
+        return
+    t_s, gap, pads = columns.t_s, columns.gap_m, force_of_pads(columns.left_n, columns.right_n)
+    late = [text for pad in pads.values() for text in grows_at_rest(t_s, gap, pad)]
+    if late or columns.units.get("gap"):
+        yield from late[:1]
+    else:
+        yield from apart(t_s, gap, columns.force_n)
+
+
 def apart(t_s: Numbers, gap: Numbers, force: Numbers) -> Iterator[str]:
     """Yield that one of gap and force turns where the other does not, by the times of a recording (s)."""
     if not (np.isfinite(t_s[[0, -1]]).all() and np.diff(t_s).min() > 0.0):
@@ -131,26 +146,33 @@ def apart(t_s: Numbers, gap: Numbers, force: Numbers) -> Iterator[str]:
 def grows_at_rest(t_s: Numbers, gap: Numbers, force: Numbers) -> Iterator[str]:
     """Yield that a force is larger while the fingers rest than when they came to this gap, by times (s)."""
     low, high = usual_range(force)
-    course, least = _without_single(force) - low, PART * (high - low)
+    course, widths = _without_single(force) - low, _without_single(gap)
     loaded = np.flatnonzero(course > LARGEST * (high - low))
     if not len(loaded) or not np.isfinite(t_s).all():
         return
-    free = np.flatnonzero(course < least)
-    begin = int(free[free < loaded[0]].max(initial=0))
-    held = slice(begin, int(free[free > loaded[0]].min(initial=len(t_s))))
-    t, width, n = t_s[held], _without_single(gap)[held], course[held]
-    travel = float(width[0] - width.min())
+    free = np.flatnonzero(course < PART * (high - low))
+    begin, pressed = int(free[free < loaded[0]].max(initial=0)), int(loaded[0])
+    held = slice(begin, int(free[free > pressed].min(initial=len(t_s))))
+    narrowest = float(widths[held].min())
+    travel = float(widths[begin]) - narrowest
     noise = NOISE * float(np.median(np.abs(np.diff(gap, 2))))
     still = max(STILL * travel, noise, STEPS * (resolution(gap) or 0.0))
-    if not travel > still:
-        return
-    resting = width <= width.min() + still
-    came = float(n[: int(resting.argmax()) + 1].max())
-    more = np.flatnonzero(resting & (n > came + least + STEEPER * (high - low) * still / travel))
-    if len(more) and t[more[-1]] - t[more[0]] > max(LATE_S, 2.0 * _period_s(t_s, force)):
+    rigid = not travel > still
+    still = noise if rigid else still
+    came = int((widths[: held.stop] <= narrowest + still).argmax())
+    least_s = max(LATE_S, *(2.0 * _period_s(t_s, signal) for signal in (gap, force) if np.ptp(signal)))
+    if not rigid:
+        least = GROWS + STEEPER * still / travel
+        larger = (course > course[: came + 1].max() + least * (high - low)) & (widths <= narrowest + still)
+        late = begin + np.flatnonzero(larger[held])
+    else:  # of something rigid, the force can grow by any amount, but it begins when the fingers stop
+        least_s += LARGEST * float(t_s[pressed] - t_s[begin])
+        late = came + np.flatnonzero(course[came:pressed] < SLIGHT * (high - low))
+    if came and len(late) and t_s[late[-1]] - t_s[late[0]] > least_s:
+        grown = 100.0 * (course[held].max() - course[came]) / (high - low)
         yield (
-            f"the force grows by {100 * (n[more].max() - came) / (high - low):.0f} % of its range from "
-            f"{t[resting.argmax()]:.4g} s on, while the fingers rest: {_LATER}"
+            f"the force grows by {grown:.0f} % of its range after {t_s[came]:.4g} s, while the fingers rest: is it the "
+            f"current of a drive with friction, {_LATER}"
         )
 
 
