@@ -229,11 +229,12 @@ EVENT: Final = "graspsense.event."
 written when the event happens, so that a grasp that is cut off keeps its events; the result lists them once more. It is
 a map of texts: `event` is JSON."""
 
-# Protocol to the writer process: one byte for the kind of message, then a body. Ticks have a fixed length. Others state
-# their length first, and those of a topic its number, in the order in which the topics were announced.
-TICK_WIRE: Final = struct.Struct("<c" + _code(TICK_FIELDS))
-LENGTH_WIRE: Final = struct.Struct("<cI")
-SIGNAL_WIRE: Final = struct.Struct("<cIH")
+HEAD_WIRE: Final = struct.Struct("<cIH")
+"""The head of a message to the writer process: its kind, the length of its body, the number of its topic, or 0.
+
+Topics are numbered in the order in which they were announced."""
+TICK_WIRE: Final = struct.Struct(HEAD_WIRE.format + TICK.format.removeprefix("<"))
+"""The head and the body of a tick."""
 IS_TICK: Final = b"T"
 IS_SIGNAL: Final = b"S"
 IS_TOPIC: Final = b"A"
