@@ -180,7 +180,7 @@ def force_of_pads(left: Numbers, right: Numbers) -> dict[str, Numbers]:
     return {"the force of the left pad": left, "the force of the right pad": right}
 
 
-def _course(values: Numbers, longest: int) -> Numbers:
+def median_course(values: Numbers, longest: int) -> Numbers:
     """Return values without what lasts at most so many samples."""
     around = np.pad(values, longest, mode="reflect")
     return np.median(np.lib.stride_tricks.sliding_window_view(around, 2 * longest + 1), axis=1)
@@ -325,7 +325,7 @@ def _parted(left: _Force, right: _Force) -> Iterator[str]:
     if not loaded.any():
         return
     scale = float(np.median(forces[0][loaded] / forces[1][loaded]))
-    steps = np.abs(np.diff(_course(forces[0] - scale * forces[1], GLITCH_SAMPLES)))
+    steps = np.abs(np.diff(median_course(forces[0] - scale * forces[1], GLITCH_SAMPLES)))
     # Where fingers meet an object, or let it go, one of them can be first.
     held = np.flatnonzero(larger > LOADED * larger.max())
     within = loaded[1:] | loaded[:-1]
@@ -341,7 +341,7 @@ def _parted(left: _Force, right: _Force) -> Iterator[str]:
 
 def _rises_at_once(force: _Force) -> Iterator[str]:
     """Yield that a force under a load rises within a sample, as where some are missing, or after its sensor stopped."""
-    steps = np.diff(_course(force.n, GLITCH_SAMPLES))
+    steps = np.diff(median_course(force.n, GLITCH_SAMPLES))
     samples, free = np.arange(len(steps)), np.flatnonzero(~force.above(FREE))
     loaded = samples - free[np.searchsorted(free, samples, side="right") - 1] >= LOADED_SAMPLES
     k = _leap(steps, loaded, max(PART * force.span, force.noise))
@@ -357,7 +357,7 @@ def _falls_at_once(force: _Force) -> Iterator[str]:
 
     A tap on the way, which falls so as it rose, is none.
     """
-    course, gap = _course(force.n, GLITCH_SAMPLES), force.gap
+    course, gap = median_course(force.n, GLITCH_SAMPLES), force.gap
     steps, closed = np.diff(course), gap <= np.minimum.accumulate(gap) + SLIGHT * np.ptp(gap)
     k = _leap(-steps, closed[1:], max(FREE * force.span, force.noise))
     if k is None or steps.max() > LOADED * -steps[k - 1]:
@@ -403,7 +403,7 @@ def _glitches(force: _Force) -> Iterator[str]:
         (GLITCH_SAMPLES, GLITCH_S, PART * span, LOADED * span),
         (FAR_SAMPLES, max(FAR_S, step_s), np.inf, FAR),
     ):
-        course = _course(sampled, min(samples, int(longest_s / step_s)))
+        course = median_course(sampled, min(samples, int(longest_s / step_s)))
         apart, free = np.abs(sampled - course), course < course.min() + PART * np.ptp(course)
         loaded_share *= np.ptp(course) if loaded_share == FAR else 1.0
         left |= (apart > np.where(free, free_share, loaded_share)) & (apart > NOISE * np.median(apart))
@@ -457,7 +457,7 @@ def _drift(force: _Force) -> Iterator[str]:
 
 def _bump(force: _Force) -> Iterator[str]:
     """Yield that a force comes, is gone while the gap (m) closes further, and comes back, by time (s)."""
-    gap, course = force.gap, _course(force.n, 1)
+    gap, course = force.gap, median_course(force.n, 1)
     course = course - usual_range(course)[0]
     least = PART * float(np.ptp(course))
     contact = max(least if "force_left" in force.units else min(least, CONTACT_FORCE_N), force.noise)

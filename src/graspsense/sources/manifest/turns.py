@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from graspsense.sources.columns.channel_facts import resolution, usual_range
 from graspsense.sources.columns.grasp_columns import GraspColumns
-from graspsense.sources.columns.recording_notices import PART, SLIGHT, force_of_pads
+from graspsense.sources.columns.recording_notices import PART, SLIGHT, force_of_pads, median_course
 from graspsense.sources.formats.table import Numbers
 from graspsense.sources.manifest.steps import NOISE
 
@@ -96,12 +96,12 @@ def timing_notices(columns: GraspColumns) -> Iterator[str]:
     """Yield what tells that gap and force of a grasp are not of one time."""
     if columns.units.get("t"):
         return
-    t_s, gap, pads = columns.t_s, columns.gap_m, force_of_pads(columns.left_n, columns.right_n)
-    late = [text for pad in pads.values() for text in grows_at_rest(t_s, gap, pad)]
-    if late or columns.units.get("gap"):
-        yield from late[:1]
-    else:
-        yield from apart(t_s, gap, columns.force_n)
+    pads = force_of_pads(columns.left_n, columns.right_n).values()
+    late = (text for pad in pads for text in grows_at_rest(columns.t_s, columns.gap_m, pad))
+    if told := next(late, None):
+        yield told
+    elif not columns.units.get("gap"):
+        yield from apart(columns.t_s, columns.gap_m, columns.force_n)
 
 
 def apart(t_s: Numbers, gap: Numbers, force: Numbers) -> Iterator[str]:
@@ -144,43 +144,31 @@ def apart(t_s: Numbers, gap: Numbers, force: Numbers) -> Iterator[str]:
 
 
 def grows_at_rest(t_s: Numbers, gap: Numbers, force: Numbers) -> Iterator[str]:
-    """Yield that a force is larger while the fingers rest than when they came to this gap, by times (s)."""
+    """Yield that a force grows while the fingers rest, or begins when they rest already, by the times (s)."""
     low, high = usual_range(force)
-    course, widths = _without_single(force) - low, _without_single(gap)
-    loaded = np.flatnonzero(course > LARGEST * (high - low))
+    share, width = (median_course(force, 1) - low) / max(high - low, 1e-300), median_course(gap, 1)
+    free, loaded = np.flatnonzero(share < PART), np.flatnonzero(share > LARGEST)
     if not len(loaded) or not np.isfinite(t_s).all():
         return
-    free = np.flatnonzero(course < PART * (high - low))
     begin, pressed = int(free[free < loaded[0]].max(initial=0)), int(loaded[0])
     held = slice(begin, int(free[free > pressed].min(initial=len(t_s))))
-    narrowest = float(widths[held].min())
-    travel = float(widths[begin]) - narrowest
-    noise = NOISE * float(np.median(np.abs(np.diff(gap, 2))))
+    narrowest, noise = float(width[held].min()), NOISE * float(np.median(np.abs(np.diff(gap, 2))))
+    travel = float(width[begin]) - narrowest
     still = max(STILL * travel, noise, STEPS * (resolution(gap) or 0.0))
-    rigid = not travel > still
-    still = noise if rigid else still
-    came = int((widths[: held.stop] <= narrowest + still).argmax())
-    least_s = max(LATE_S, *(2.0 * _period_s(t_s, signal) for signal in (gap, force) if np.ptp(signal)))
-    if not rigid:
-        least = GROWS + STEEPER * still / travel
-        larger = (course > course[: came + 1].max() + least * (high - low)) & (widths <= narrowest + still)
-        late = begin + np.flatnonzero(larger[held])
-    else:  # of something rigid, the force can grow by any amount, but it begins when the fingers stop
+    rests = width <= narrowest + (still if travel > still else noise)
+    came = int(rests[: held.stop].argmax())
+    least_s = max(LATE_S, *(2.0 * _period_s(t_s, signal) for signal in (t_s, gap, force) if np.ptp(signal)))
+    if travel > still:
+        explained = share[: came + 1].max() + GROWS + STEEPER * still / travel
+        late = begin + np.flatnonzero(rests[held] & (share[held] > explained))
+    else:  # the force on something rigid can grow by any amount, but it begins when the fingers come to rest
+        late = came + np.flatnonzero(share[came:pressed] < SLIGHT)
         least_s += LARGEST * float(t_s[pressed] - t_s[begin])
-        late = came + np.flatnonzero(course[came:pressed] < SLIGHT * (high - low))
     if came and len(late) and t_s[late[-1]] - t_s[late[0]] > least_s:
-        grown = 100.0 * (course[held].max() - course[came]) / (high - low)
         yield (
-            f"the force grows by {grown:.0f} % of its range after {t_s[came]:.4g} s, while the fingers rest: is it the "
-            f"current of a drive with friction, {_LATER}"
+            f"the force grows by {100.0 * (share[held].max() - share[came]):.0f} % of its range after {t_s[came]:.4g} "
+            f"s, while the fingers rest: is it the current of a drive with friction, {_LATER}"
         )
-
-
-def _without_single(values: Numbers) -> Numbers:
-    """Return values without single ones that leave their course."""
-    around = np.lib.stride_tricks.sliding_window_view(np.pad(values, 1, mode="edge"), 3)
-    course: Numbers = np.median(around, axis=1)
-    return course
 
 
 def _period_s(t_s: Numbers, signal: Numbers) -> float:
