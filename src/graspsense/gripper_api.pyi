@@ -96,7 +96,6 @@ from graspsense.store.stored_grasps import StoredGrasp as StoredGrasp
 from graspsense.core.files.whole_file import SaveFailed as SaveFailed
 from graspsense.sources.formats.parquet_format import read_parquet as read_parquet
 from graspsense.sources.manifest.steps import squeezes as squeezes
-from graspsense.sources.manifest.turns import timing_notices as timing_notices
 from graspsense.sources.formats.table import ColumnTable as ColumnTable
 from graspsense.core.values.errors import TooLarge as TooLarge
 

@@ -6,7 +6,7 @@ import numpy as np
 from cases import every_case
 
 from graspsense.sources.columns.force_and_gap import doubtful_delay
-from graspsense.sources.manifest.turns import apart, grows_at_rest
+from graspsense.sources.manifest.turns import apart
 
 T_S = np.arange(0.0, 2.5, 0.01)
 
@@ -80,33 +80,3 @@ def test_rare_values_a_faster_drive_and_a_recording_without_a_clock_tell_of_no_t
     assert not [*apart(t_s, faster, smoothed(t_s, np.maximum(1500.0 * (0.05 - faster), 0.0), 0.02))]
     assert not [*apart(np.zeros(len(t_s)), gap, force)]
     assert not [*apart(t_s[:5], gap[:5], force[:5])]
-
-
-def filtered(t_s: Any, signal: Any, seconds: float) -> Any:
-    """Return what a filter of first order with this time constant gives while a signal is recorded."""
-    share, state, course = 1.0 - np.exp(-t_s[1] / seconds), 0.0, []
-    for value in signal.tolist():
-        state += share * (value - state)
-        course.append(state)
-    return np.array(course)
-
-
-@every_case("rate_hz", [50.0, 500.0])
-@every_case("object_", ["linear", "hardens", "relaxes"])
-def test_a_force_that_grows_while_the_fingers_rest_is_told(rate_hz: float, object_: str) -> None:
-    """Of a drive that slows down little by little, where nothing turns at once."""
-    t_s = np.arange(0.0, 3.0, 1.0 / rate_hz)
-    rng = np.random.default_rng(3)
-    pressed = 0.004 * (1.0 - np.exp(-np.clip(t_s - 1.0, 0.0, None) / 0.1))
-    force = {
-        "linear": 1500.0 * pressed,
-        "hardens": 9e7 * pressed**3,
-        "relaxes": 2500.0 * pressed - 1000.0 * filtered(t_s, pressed, 0.3),
-    }[object_] + rng.normal(0.0, 0.01, len(t_s))
-    gap = np.where(t_s < 1.0, 0.05 + 0.04 * (1.0 - t_s), 0.05 - pressed)
-    for gap_m in (gap, np.round(gap, 4), gap + rng.normal(0.0, 5e-6, len(t_s))):
-        assert not [*grows_at_rest(t_s, gap_m, force)]
-    told = [*grows_at_rest(t_s, gap, filtered(t_s, force, 0.3))]
-    assert len(told) == (object_ != "relaxes")  # that falls as the filter follows
-    # Where the gap moves by less than its steps, it tells of no rest.
-    assert not [*grows_at_rest(t_s, np.round(gap, 2), filtered(t_s, force, 0.3))]

@@ -16,7 +16,7 @@ import numpy as np
 from attrs import evolve
 from numpy.typing import NDArray
 
-from graspsense.gripper_api import squeezes, timing_notices
+from graspsense.gripper_api import squeezes
 from graspsense.plugin_api import (
     ConfigError,
     DataDamaged,
@@ -118,7 +118,7 @@ def _grasp(
         + ("" if (understood.folder.place / path).is_file() else ", which is missing")
         for key, (path, first_s) in episode.videos.items()
     ]
-    of_squeeze = (*notices_of_gap(columns), *timing_notices(columns))
+    of_gap = tuple(notices_of_gap(columns))
     moved = evolve(
         columns,
         t_s=columns.t_s - start_s,
@@ -131,7 +131,7 @@ def _grasp(
             source=columns.source,
             label=label_of_task(episode.task),
             order=episode.index + number / 1000.0,
-            notices=(*columns.warnings, *of_squeeze),
+            notices=(*columns.warnings, *of_gap),
         ),
     )
 

@@ -63,6 +63,8 @@ ROUGH_S: Final = 0.1
 """Time (s) over which a force is averaged: single values that are usually farther away than `SLIGHT` are not known."""
 LATE_S: Final = 0.04
 """A force or a gap that is later than this (s), and than two samples, is late."""
+CREEP: Final = 0.15
+"""Share of its range by which a force grows at rest as its sensor creeps."""
 SELDOM_S: Final = 0.05
 SELDOM_ROWS: Final = 5
 """A force or gap that keeps each value for so long, and so many samples, is measured more rarely than the rows."""
@@ -164,13 +166,16 @@ def signal_notices(recording: Recording) -> Iterator[str]:
             told += [*_glitches(force), *_seldom(force.what, force.t, force.n, FREE)]
             told += [] if doubtful else _rough(force)
         told += _drift(force)
-    yield from told or [*_rises_at_once(mean), *_falls_at_once(mean)]
+    told = told or [*_rises_at_once(mean), *_falls_at_once(mean)]
     if not {"gap", "t"} & recording.units.keys():
-        yield from _bump(mean)
-        yield from next(filter(None, map(list, map(_late, forces))), ())
+        told += _bump(mean)
+        told += next(filter(None, map(list, map(_late_gap, forces))), ())
         gap_mm = evolve(mean, what="the gap", n=1e3 * mean.gap, units={"force_left": "mm"})
-        yield from [*_glitches(gap_mm), *_filled(gap_mm)] or _gap_leaps(mean.t, mean.gap)
-        yield from _stopped_gap(mean)
+        told += [*_glitches(gap_mm), *_filled(gap_mm)] or _gap_leaps(mean.t, mean.gap)
+        told += _stopped_gap(mean)
+    if "t" not in recording.units:
+        told += next(filter(None, (list(_late(force, doubtful=bool(told))) for force in forces)), ())
+    yield from told
 
 
 def force_of_pads(left: Numbers, right: Numbers) -> dict[str, Numbers]:
@@ -481,33 +486,74 @@ def _bump(force: _Force) -> Iterator[str]:
         )
 
 
-def _late(force: _Force) -> Iterator[str]:
-    """Yield that a force stays while the fingers open, or that the gap (m) follows late, by time (s)."""
-    t, gap, span_m = force.t, force.gap, float(np.ptp(force.gap))
+def _late(force: _Force, *, doubtful: bool) -> Iterator[str]:
+    """Yield that a force is not of the time of its gap, in which no object presses more than when the fingers came.
+
+    It stays while they are wider than at the contact. If it is not `doubtful` for another reason: it grows while they
+    rest, by more than its creep and what they still close explain, or it begins when they rest on something rigid.
+    """
+    t, gap, n = force.t, median_course(force.gap, 1), median_course(force.n, 1) - force.low
+    loaded, free = np.flatnonzero(n > LOADED * force.span), np.flatnonzero(n < PART * force.span)
+    if not len(loaded):
+        return
+    begin, pressed = int(free[free < loaded[0]].max(initial=0)), int(loaded[0])
+    end = int(free[free > pressed].min(initial=len(t)))
+    narrowest, noise = float(gap[begin:end].min()), NOISE * float(np.median(np.abs(np.diff(force.gap, 2))))
+    travel = float(gap[begin]) - narrowest
+    still = max(SLIGHT * travel, noise, LEAP * (resolution(force.gap) or 0.0))
+    rests = gap <= narrowest + (still if travel > still else noise)
+    came = int(rests[:end].argmax())
+    least_s = max(
+        LATE_S, *(2.0 * period_s(t, values) for values in (t, force.gap, force.n) if np.ptp(values))
+    )
+    wide = gap > gap[begin] + SLIGHT * np.ptp(force.gap)
+    stays = came + np.flatnonzero(wide[came:end] & (n[came:end] > LOADED * force.span))
+    if travel > still:
+        explained = n[: came + 1].max() + (CREEP + 2.0 * still / travel) * force.span
+        later = begin + np.flatnonzero(rests[begin:end] & (n[begin:end] > explained))
+    else:
+        later = came + np.flatnonzero(n[came:pressed] < SLIGHT * force.span)
+    begins_s = 0.0 if travel > still else LOADED * float(t[pressed] - t[begin])
+    if end < len(t) and len(stays) and t[stays[-1]] - t[stays[0]] > least_s:
+        yield (
+            f"{force.what} stays until {force.when(stays[-1])}, although the fingers are wider than at the contact "
+            f"from {force.when(stays[0])} on: does the force come late, or did its sensor stop?"
+        )
+    elif not doubtful and came and len(later) and t[later[-1]] - t[later[0]] > least_s + begins_s:
+        grown = 100.0 * float(n[begin:end].max() - n[came]) / force.span
+        yield (
+            f"{force.what} grows by {grown:.0f} % of its range after {force.when(came)}, while the fingers rest: does "
+            "it come late, was it smoothed, is it the current of a drive with friction, or is something hard in a soft "
+            "layer? If it is late, a contact is too"
+        )
+
+
+def _late_gap(force: _Force) -> Iterator[str]:
+    """Yield that a gap (m) follows late: the fingers go on after the contact, and open after the force is gone."""
+    t, gap = force.t, force.gap
     loaded, free = np.flatnonzero(force.above(LOADED)), np.flatnonzero(~force.above(PART))
     onset, gone = free[free < loaded[:1].sum()], free[free > loaded[-1:].sum()]
     if not len(loaded) or not len(onset) or not len(gone):
         return
     begin, end = int(onset[-1]), int(gone[0])
-    least_s = max(LATE_S, 2.0 * float(np.median(np.diff(t))))
-    wide = loaded[(gap[loaded] > gap[begin] + SLIGHT * span_m) & (loaded > loaded[gap[loaded].argmin()])]
-    if len(wide) and t[wide[-1]] - t[wide[0]] > least_s:
-        yield (
-            f"{force.what} stays until {force.when(wide[-1])}, although the fingers are wider than at the contact from "
-            f"{force.when(wide[0])} on: does the force come late, or did its sensor stop?"
-        )
-        return
-    still = 0.5 * SLIGHT * span_m
+    still = 0.5 * SLIGHT * float(np.ptp(gap))
     opens = end + int((gap[end:] > gap[begin : end + 1].min() + still).argmax())
     late_s = float(t[opens] - t[end])
     around_s = t[begin] + late_s * np.arange(-1, 2)
     approach, further = -np.diff(np.interp(around_s, t, gap))
     closes = float(np.interp(t[end] - late_s, t, gap)) - gap[end] > FREE * approach
+    least_s = max(LATE_S, 2.0 * float(np.median(np.diff(t))))
     if late_s > least_s and around_s[0] >= t[0] and further > FREE * approach > still and not closes:
         yield (
             f"the fingers go on as fast after the force begins (at {force.when(begin)}), and open {late_s:.2g} s "
             "after it is gone: does the gap come late?"
         )
+
+
+def period_s(t_s: Numbers, signal: Numbers) -> float:
+    """Return the usual time (s) between two new values of a signal, infinite if it has none."""
+    new = np.diff(t_s[np.flatnonzero(np.diff(signal))])
+    return float(np.median(new)) if len(new) else np.inf
 
 
 def _gap_leaps(t_s: Numbers, gap: Numbers) -> Iterator[str]:

@@ -15,7 +15,7 @@ from graspsense.sources.columns.grasp_columns import GraspColumns
 from graspsense.sources.columns.recording_notices import FEWEST, PART, ZERO_SAMPLES, force_of_pads
 from graspsense.sources.manifest.closings import CLOSED, OPEN
 from graspsense.sources.manifest.steps import NOISE, squeezes
-from graspsense.sources.manifest.turns import timing_notices
+from graspsense.sources.manifest.turns import apart
 
 if TYPE_CHECKING:
     from graspsense.sources.formats.table import Numbers
@@ -74,7 +74,8 @@ def notices_of(columns: GraspColumns, keys: Manifest) -> Iterator[str]:
     yield from _of_time(columns, divided=keys.split == "force")
     if _is_felt(columns.force_n):
         yield from _of_holes(columns)
-        yield from timing_notices(columns)
+        if not {"t", "gap"} & {name for name, unit in columns.units.items() if unit}:
+            yield from apart(columns.t_s, columns.gap_m, columns.force_n)
 
 
 def falls_on_closing(columns: GraspColumns) -> str:

@@ -1,9 +1,7 @@
-"""Whether force and gap are of one time: a force rests when the fingers do, and turns when they turn.
+"""Whether force and gap turn together: under a load, the rate of a force changes when the fingers change their speed.
 
-No object presses more in a gap than when the fingers came there, so a force that grows while they rest was filtered, or
-comes late. Under a load, the rate of a force changes when the fingers change their speed. It does so at the same time
-and as sharply, since a force follows the deformation, or runs before it where an object is viscous. A signal that was
-smoothed turns slowly, and so does one where the other turns if it is of another time.
+It does so at the same time and as sharply, since a force follows the deformation, or runs before it where an object is
+viscous. A signal that was smoothed turns slowly, and so does one where the other turns if it is of another time.
 How sharply a signal turns is its second difference over a short time, as a share of that over a time `FAR` times as
 long if it grew with the time: 1 at a kink, and 1 / `FAR` where its course is smooth.
 """
@@ -18,8 +16,7 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 from graspsense.sources.columns.channel_facts import resolution, usual_range
-from graspsense.sources.columns.grasp_columns import GraspColumns
-from graspsense.sources.columns.recording_notices import PART, SLIGHT, force_of_pads, median_course
+from graspsense.sources.columns.recording_notices import PART, period_s
 from graspsense.sources.formats.table import Numbers
 from graspsense.sources.manifest.steps import NOISE
 
@@ -39,17 +36,6 @@ DUE: Final = 0.2
 """Share of the range of a force by which it has to turn where its mean stiffness under a load says so."""
 STEPS: Final = 3.0
 """A turn is larger than so many steps of a coarse signal."""
-STILL: Final = 0.02
-"""Share of its travel under a load within which a gap rests;"""
-STEEPER: Final = 2.0
-"""there, a force grows by so many times the share that it grew by before,"""
-GROWS: Final = 0.15
-"""and by this share of its range as its sensor creeps."""
-LATE_S: Final = 0.04
-"""A force that is larger for longer (s), and for longer than two of its values, is late."""
-_LATER: Final = (
-    "was the force smoothed, or is it of another time? A contact is then seen too early or too late"
-)
 
 
 @frozen(eq=False)
@@ -92,23 +78,11 @@ class _Turns:
         return float(np.abs(self.near[part]).max()), float(np.abs(self.far[part]).max())
 
 
-def timing_notices(columns: GraspColumns) -> Iterator[str]:
-    """Yield what tells that gap and force of a grasp are not of one time."""
-    if columns.units.get("t"):
-        return
-    pads = force_of_pads(columns.left_n, columns.right_n).values()
-    late = (text for pad in pads for text in grows_at_rest(columns.t_s, columns.gap_m, pad))
-    if told := next(late, None):
-        yield told
-    elif not columns.units.get("gap"):
-        yield from apart(columns.t_s, columns.gap_m, columns.force_n)
-
-
 def apart(t_s: Numbers, gap: Numbers, force: Numbers) -> Iterator[str]:
     """Yield that one of gap and force turns where the other does not, by the times of a recording (s)."""
     if not (np.isfinite(t_s[[0, -1]]).all() and np.diff(t_s).min() > 0.0):
         return
-    step_s = max(_period_s(t_s, signal) for signal in (t_s, gap, force))
+    step_s = max(period_s(t_s, signal) for signal in (t_s, gap, force))
     n = max(2, round(TURN_S / step_s))
     rows = (t_s[-1] - t_s[0]) / step_s
     if FAR * n * step_s > LONGEST_S or not 2 * FAR * n < rows < (1.0 + HOLES) * len(t_s):
@@ -130,7 +104,8 @@ def apart(t_s: Numbers, gap: Numbers, force: Numbers) -> Iterator[str]:
     if k is not None and (far < least or FAR * near < SHARP * far * min(gaps.sharp[k], 1.0)):
         yield (
             f"the fingers change their speed at once at {clock[k + FAR * n]:.4g} s, under a load, and the rate of the "
-            f"force changes slowly: {_LATER}"
+            "force changes slowly: was the force smoothed, or is it of another time than the gap? A contact is then "
+            "seen too early or too late"
         )
         return
     k = forces.largest(pressed, (np.abs(forces.near) > least) & (np.abs(gaps.far) > gaps.unknown))
@@ -141,37 +116,3 @@ def apart(t_s: Numbers, gap: Numbers, force: Numbers) -> Iterator[str]:
             "change their speed slowly: was the gap smoothed, or is it of another time than the force? A rest is then "
             "seen too late"
         )
-
-
-def grows_at_rest(t_s: Numbers, gap: Numbers, force: Numbers) -> Iterator[str]:
-    """Yield that a force grows while the fingers rest, or begins when they rest already, by the times (s)."""
-    low, high = usual_range(force)
-    share, width = (median_course(force, 1) - low) / max(high - low, 1e-300), median_course(gap, 1)
-    free, loaded = np.flatnonzero(share < PART), np.flatnonzero(share > LARGEST)
-    if not len(loaded) or not np.isfinite(t_s).all():
-        return
-    begin, pressed = int(free[free < loaded[0]].max(initial=0)), int(loaded[0])
-    held = slice(begin, int(free[free > pressed].min(initial=len(t_s))))
-    narrowest, noise = float(width[held].min()), NOISE * float(np.median(np.abs(np.diff(gap, 2))))
-    travel = float(width[begin]) - narrowest
-    still = max(STILL * travel, noise, STEPS * (resolution(gap) or 0.0))
-    rests = width <= narrowest + (still if travel > still else noise)
-    came = int(rests[: held.stop].argmax())
-    least_s = max(LATE_S, *(2.0 * _period_s(t_s, signal) for signal in (t_s, gap, force) if np.ptp(signal)))
-    if travel > still:
-        explained = share[: came + 1].max() + GROWS + STEEPER * still / travel
-        late = begin + np.flatnonzero(rests[held] & (share[held] > explained))
-    else:  # the force on something rigid can grow by any amount, but it begins when the fingers come to rest
-        late = came + np.flatnonzero(share[came:pressed] < SLIGHT)
-        least_s += LARGEST * float(t_s[pressed] - t_s[begin])
-    if came and len(late) and t_s[late[-1]] - t_s[late[0]] > least_s:
-        yield (
-            f"the force grows by {100.0 * (share[held].max() - share[came]):.0f} % of its range after {t_s[came]:.4g} "
-            f"s, while the fingers rest: is it the current of a drive with friction, {_LATER}"
-        )
-
-
-def _period_s(t_s: Numbers, signal: Numbers) -> float:
-    """Return the usual time (s) between two new values of a signal, infinite if it has none."""
-    new = np.diff(t_s[np.flatnonzero(np.diff(signal))])
-    return float(np.median(new)) if len(new) else np.inf
