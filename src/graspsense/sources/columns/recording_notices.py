@@ -169,7 +169,6 @@ def signal_notices(recording: Recording) -> Iterator[str]:
     told = told or [*_rises_at_once(mean), *_falls_at_once(mean)]
     if not {"gap", "t"} & recording.units.keys():
         told += _bump(mean)
-        told += next(filter(None, map(list, map(_late_gap, forces))), ())
         gap_mm = evolve(mean, what="the gap", n=1e3 * mean.gap, units={"force_left": "mm"})
         told += [*_glitches(gap_mm), *_filled(gap_mm)] or _gap_leaps(mean.t, mean.gap)
         told += _stopped_gap(mean)
@@ -487,16 +486,17 @@ def _bump(force: _Force) -> Iterator[str]:
 
 
 def _late(force: _Force, *, doubtful: bool) -> Iterator[str]:
-    """Yield that a force is not of the time of its gap, in which no object presses more than when the fingers came.
+    """Yield that a force and its gap (m) are not of one time: no object presses more than when the fingers came.
 
-    It stays while they are wider than at the contact. If it is not `doubtful` for another reason: it grows while they
-    rest, by more than its creep and what they still close explain, or it begins when they rest on something rigid.
+    A late force stays while they are wider than at the contact. A late gap goes on after the contact, and opens after
+    the force is gone. If it is not `doubtful` for another reason: a force grows while they rest, by more than its creep
+    and what they still close explain, or it begins when they rest on something rigid.
     """
     t, gap, n = force.t, median_course(force.gap, 1), median_course(force.n, 1) - force.low
     loaded, free = np.flatnonzero(n > LOADED * force.span), np.flatnonzero(n < PART * force.span)
     if not len(loaded):
         return
-    begin, pressed = int(free[free < loaded[0]].max(initial=0)), int(loaded[0])
+    begin, pressed, span = int(free[free < loaded[0]].max(initial=0)), int(loaded[0]), float(np.ptp(gap))
     end = int(free[free > pressed].min(initial=len(t)))
     narrowest, noise = float(gap[begin:end].min()), NOISE * float(np.median(np.abs(np.diff(force.gap, 2))))
     travel = float(gap[begin]) - narrowest
@@ -506,47 +506,37 @@ def _late(force: _Force, *, doubtful: bool) -> Iterator[str]:
     least_s = max(
         LATE_S, *(2.0 * period_s(t, values) for values in (t, force.gap, force.n) if np.ptp(values))
     )
-    wide = gap > gap[begin] + SLIGHT * np.ptp(force.gap)
-    stays = came + np.flatnonzero(wide[came:end] & (n[came:end] > LOADED * force.span))
+    stays = np.flatnonzero((gap[came:end] > gap[begin] + SLIGHT * span) & (n[came:end] > LOADED * force.span))
     if travel > still:
         explained = n[: came + 1].max() + (CREEP + 2.0 * still / travel) * force.span
-        later = begin + np.flatnonzero(rests[begin:end] & (n[begin:end] > explained))
+        later, begins_s = np.flatnonzero(rests[came:end] & (n[came:end] > explained)), 0.0
     else:
-        later = came + np.flatnonzero(n[came:pressed] < SLIGHT * force.span)
-    begins_s = 0.0 if travel > still else LOADED * float(t[pressed] - t[begin])
-    if end < len(t) and len(stays) and t[stays[-1]] - t[stays[0]] > least_s:
+        later = np.flatnonzero(n[came:pressed] < SLIGHT * force.span)
+        begins_s = LOADED * float(t[pressed] - t[begin])
+    opens = end - 1 + int((gap[end - 1 :] > narrowest + 0.5 * SLIGHT * span).argmax())
+    late_s = float(t[opens] - t[end - 1])
+    around_s = t[begin] + late_s * np.arange(-1, 2)
+    approach, further = -np.diff(np.interp(around_s, t, gap))
+    goes_on = further > FREE * approach > 0.5 * SLIGHT * span and around_s[0] >= t[0]
+    closes = float(np.interp(t[end - 1] - late_s, t, gap)) - gap[end - 1] > FREE * approach
+    if end < len(t) and len(stays) and t[came + stays[-1]] - t[came + stays[0]] > least_s:
         yield (
-            f"{force.what} stays until {force.when(stays[-1])}, although the fingers are wider than at the contact "
-            f"from {force.when(stays[0])} on: does the force come late, or did its sensor stop?"
+            f"{force.what} stays until {force.when(came + stays[-1])}, although the fingers are wider than at the "
+            f"contact from {force.when(came + stays[0])} on: does the force come late, or did its sensor stop?"
         )
-    elif not doubtful and came and len(later) and t[later[-1]] - t[later[0]] > least_s + begins_s:
+    elif late_s > least_s and goes_on and not closes and "gap" not in force.units:
+        yield (
+            f"the fingers go on as fast after the force begins (at {force.when(begin)}), and open {late_s:.2g} s "
+            "after it is gone: does the gap come late?"
+        )
+    elif (
+        not doubtful and came and len(later) and t[came + later[-1]] - t[came + later[0]] > least_s + begins_s
+    ):
         grown = 100.0 * float(n[begin:end].max() - n[came]) / force.span
         yield (
             f"{force.what} grows by {grown:.0f} % of its range after {force.when(came)}, while the fingers rest: does "
             "it come late, was it smoothed, is it the current of a drive with friction, or is something hard in a soft "
             "layer? If it is late, a contact is too"
-        )
-
-
-def _late_gap(force: _Force) -> Iterator[str]:
-    """Yield that a gap (m) follows late: the fingers go on after the contact, and open after the force is gone."""
-    t, gap = force.t, force.gap
-    loaded, free = np.flatnonzero(force.above(LOADED)), np.flatnonzero(~force.above(PART))
-    onset, gone = free[free < loaded[:1].sum()], free[free > loaded[-1:].sum()]
-    if not len(loaded) or not len(onset) or not len(gone):
-        return
-    begin, end = int(onset[-1]), int(gone[0])
-    still = 0.5 * SLIGHT * float(np.ptp(gap))
-    opens = end + int((gap[end:] > gap[begin : end + 1].min() + still).argmax())
-    late_s = float(t[opens] - t[end])
-    around_s = t[begin] + late_s * np.arange(-1, 2)
-    approach, further = -np.diff(np.interp(around_s, t, gap))
-    closes = float(np.interp(t[end] - late_s, t, gap)) - gap[end] > FREE * approach
-    least_s = max(LATE_S, 2.0 * float(np.median(np.diff(t))))
-    if late_s > least_s and around_s[0] >= t[0] and further > FREE * approach > still and not closes:
-        yield (
-            f"the fingers go on as fast after the force begins (at {force.when(begin)}), and open {late_s:.2g} s "
-            "after it is gone: does the gap come late?"
         )
 
 
