@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from graspsense.experiment_api import settings_from, structured
 from graspsense.plugin_api import HOLD, NO_PADS, ConfigError, Frame, Reading, Samples, Trace
 from graspsense.simulator_api import BatchBackend
-from graspsense_romano.signals import Signals, filters, no_signals, updated
+from graspsense_romano.signals import FILTERS, NO_SIGNALS, Signals, updated
 
 LIFT_S: Final = 2.0
 """When the arm lifts, after both fingers touched."""
@@ -219,7 +219,7 @@ def touch(params: Mapping[str, Any], seed: int) -> TouchRow:
 
 def followed(trace: Trace) -> list[Signals]:
     """Return the signals after each frame of a trace."""
-    coefficients, now, signals_by_frame = filters(), no_signals(), []
+    now, signals_by_frame = NO_SIGNALS, []
     fast = trace.signals.get("acceleration")
     counts = np.zeros(0, int) if fast is None else np.searchsorted(fast.t_s, trace.t_s, side="right")
     begun = 0
@@ -232,7 +232,7 @@ def followed(trace: Trace) -> list[Signals]:
             begun = counts[k]
             signals = _Fast(Samples(float(trace.t_s[k]), int(begun), len(rows), rows))
         frame = Frame(**{name: column[k] for name, column in columns.items()})
-        now = updated(coefficients, now, Reading(frame, NO_PADS, signals))
+        now = updated(FILTERS, now, Reading(frame, NO_PADS, signals))
         signals_by_frame.append(now)
     return signals_by_frame
 
