@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import json
 import os
-import struct
 import sys
 import time
 from pathlib import Path
@@ -22,7 +21,6 @@ from graspsense.recording.writer import RecordingWriter
 
 READ_EVERY_S: Final = 0.01
 READ_BYTES: Final = 1 << 20
-_T_S: Final = struct.Struct("<d")
 BEHIND: Final = 1 << 16
 """A read of this many bytes or more is followed by the next read without a pause."""
 
@@ -72,7 +70,7 @@ def _write_messages(file: RecordingWriter, buffer: bytearray) -> bool:
         if kind == IS_END:
             return True
         if kind == IS_TICK:
-            file.tick(_T_S.unpack_from(body)[0], body)
+            file.tick(body)
         elif kind == IS_SIGNAL:
             file.signal(number, body)
         elif kind == IS_TOPIC:
