@@ -38,6 +38,7 @@ from graspsense.sources.manifest.files import NamedFile, files_of, left_out
 from graspsense.sources.manifest.notices import falls_on_closing, notices_of
 from graspsense.sources.manifest.samples import samples
 from graspsense.sources.manifest.steps import cut_at, resampled, squeezes
+from graspsense.sources.units import TO_SI, unit_since_1970
 
 
 def read_recordings(place: str) -> Iterator[LabelledRecording | UnreadableRecording]:
@@ -121,7 +122,8 @@ def _joined(manifest: ReadManifest, tables: list[ColumnTable], path: Path, prefi
     if rows[0] == rows[1] and time is not None:
         warnings = tuple(_other_times(table, other, path, time))
     elif time is not None:
-        table, other = _by_time(table, other, time)
+        unit = next((part.unit for part in manifest.expressions["time"] if part.unit), "")
+        table, other = _by_time(table, other, time, unit or table.units.get(time, ""))
 
     def named(columns: Mapping[str, Any]) -> dict[str, Any]:
         return {f"{prefix}.{name}": column for name, column in columns.items()}
@@ -138,7 +140,7 @@ def _joined(manifest: ReadManifest, tables: list[ColumnTable], path: Path, prefi
     ]
 
 
-def _by_time(table: ColumnTable, other: ColumnTable, time: str) -> tuple[ColumnTable, ColumnTable]:
+def _by_time(table: ColumnTable, other: ColumnTable, time: str, unit: str) -> tuple[ColumnTable, ColumnTable]:
     """Return two tables at the times of the one with more rows, each with its last values. Raises DataDamaged."""
     parts, times = (table, other), _times_of(table, other, time)
     if not all(len(at_s) > 1 and (np.diff(at_s) > 0.0).all() for at_s in times):
@@ -146,10 +148,12 @@ def _by_time(table: ColumnTable, other: ColumnTable, time: str) -> tuple[ColumnT
             f"{table.source} and {other.source} are joined by {time}, which has to increase in both"
         )
     # As the messages of two topics without headers.
-    came = [np.rint(at_s * 1e9).astype(np.int64).tolist() for at_s in times]
+    ns = 1e9 * TO_SI["time"].get(unit or unit_since_1970(float(times[0][0])), 1.0)
+    began = min(at_s[0] for at_s in times)
+    came = [list(map(round, ((at_s - began) * ns).tolist())) for at_s in times]
     topics = {
-        part.source: Messages(recorded_ns=ns, stamped_ns=[0] * len(ns))
-        for part, ns in zip(parts, came, strict=True)
+        part.source: Messages(recorded_ns=recorded_ns, stamped_ns=[0] * len(recorded_ns))
+        for part, recorded_ns in zip(parts, came, strict=True)
     }
     clock = common_clock(time, topics)
     most = max(parts, key=len)
