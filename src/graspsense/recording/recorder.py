@@ -17,7 +17,7 @@ from graspsense.core.values.json_values import json_text
 from graspsense.core.values.signals import GraspEvent, event_as_json
 from graspsense.recording.feed import Feed, json_message
 from graspsense.recording.layout import EVENT, IS_END, IS_METADATA, PART, READY
-from graspsense.recording.recording_info import RecordingInfo
+from graspsense.recording.recording_info import WRITTEN, RecordingInfo
 
 QUEUE_BYTES: Final = 256 << 20
 """Limit on the messages that wait for the pipe."""
@@ -67,10 +67,7 @@ class Recorder(Feed):
             raise self._failure(answer)
         return RecordingInfo(
             path=self.path,
-            sha256=answer["sha256"],
-            size=answer["size"],
-            ticks=answer["ticks"],
-            images=answer["images"],
+            **{name: answer[name] for name in WRITTEN},
             deferred=self._deferred,
             most_waiting=self._most_waiting,
             dropped=self._dropped,

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Final
 
 from graspsense.recording.layout import IS_END, IS_SIGNAL, IS_TICK, IS_TOPIC, READY, Topic
+from graspsense.recording.recording_info import WRITTEN
 from graspsense.recording.wire_messages import complete_messages, leave_control_alone
 from graspsense.recording.writer import RecordingWriter
 
@@ -54,12 +55,7 @@ def _write(path: Path) -> dict[str, object]:
         buffer += data
         if _write_messages(file, buffer):
             written = file.finish()
-            return {
-                "sha256": written.sha256,
-                "size": written.size,
-                "ticks": written.ticks,
-                "images": written.images,
-            }
+            return {name: getattr(written, name) for name in WRITTEN}
         if len(data) < BEHIND:
             time.sleep(READ_EVERY_S)
 
