@@ -87,7 +87,7 @@ def write_recording(path, ticks=120, record=None, finish=True, grasp=0, **texts)
         if k == 0 or pads(k - 1).counter != image.counter:
             file.signal(number, layout.wire.pack(*pads_numbers(image)))
         measured = frame(k)._replace(effort_n=5.0 + grasp)
-        file.tick(measured.t_s, TICK.pack(*measured, 3, *command(k)))
+        file.tick(TICK.pack(*measured, 3, *command(k)))
     if record.result is not None:
         file.metadata(RESULT, record.section(RESULT))
     if finish:

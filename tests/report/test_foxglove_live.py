@@ -19,7 +19,7 @@ from graspsense import load_pipeline
 from graspsense.core.components.registry import installed
 from graspsense.core.values.signals import SQUEEZE
 from graspsense.live.feeds import LiveFeed
-from graspsense.recording.layout import IS_TICK, TICK_FIELDS, TICK_WIRE
+from graspsense.recording.layout import IS_TICK, TICK, TICK_FIELDS, TICK_WIRE
 from graspsense.store.record_grasp import record_grasp
 from graspsense.store.store import Store
 
@@ -183,7 +183,7 @@ def test_a_viewer_who_comes_later_sees_the_last_grasp_alone(feed):
 def test_what_is_kept_for_viewers_who_come_later_does_not_grow(monkeypatch):
     monkeypatch.setattr(foxglove_process, "HISTORY_BYTES", 10_000)
     grasp = foxglove_process.RunningGrasp()
-    tick = TICK_WIRE.pack(IS_TICK, *reading(1).frame, SQUEEZE, *COMMAND)
+    tick = TICK_WIRE.pack(IS_TICK, TICK.size, 0, *reading(1).frame, SQUEEZE, *COMMAND)
     kept = []
     for _ in range(3):
         grasp.take(bytearray(tick * 10_000))

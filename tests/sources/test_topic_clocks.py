@@ -15,6 +15,7 @@ from graspsense.recording.labelled_recording import LabelledRecording, Unreadabl
 from graspsense.recording.replayable import Recording
 from graspsense.sources.formats.topic_clocks import Messages, common_clock
 from graspsense.sources.importing.import_sources import recordings_to_import
+from graspsense.sources.manifest.expression import ExpressionError, parse
 from graspsense.sources.recordings.dataset_recordings import readable_or_not
 
 S = 1_000_000_000
@@ -285,3 +286,8 @@ def test_messages_of_one_topic_are_divided_by_the_names_that_they_have(tmp_path:
     assert np.array_equal(numbers["/joint_states.elbow.position"], np.full(300, 1.5))
     assert np.array_equal(numbers["/values.force.value"], FORCE_N)
     assert np.array_equal(numbers["/weight.value"], np.full(300, 2.0))
+    # Named as a whole, the topic has no such column, and the refusal names its parts.
+    shown = read_bag(folder, ["/joint_states.position", "/weight.value"])[0].numbers
+    assert "/values.force.value" not in shown
+    with pytest.raises(ExpressionError, match=r"in turn.*/joint_states\.finger\.position"):
+        parse("'/joint_states.position'").columns(tuple(shown))

@@ -172,7 +172,7 @@ def crafted(path, ticks=(), result=None, **sections):
     record = ended()
     file.metadata(START, {**record.section(START), **sections})
     for tick in ticks:
-        file.tick(10.0, TICK.pack(*tick))
+        file.tick(TICK.pack(*tick))
     file.metadata(RESULT, {**record.section(RESULT), **(result or {})})
     file.finish()
 

@@ -101,6 +101,7 @@ ALL, GAP, SECOND_FINGER = slice(None), 1, slice(15, None)
         ({"fps": 60}, "fps=60", "fps", 90),
         ({"states": [np.repeat(episode(), 2, axis=0)]}, "repeated=drop", "repeated=drop", 90),
         ({"states": [changed(ALL, GAP, lambda gap: 100.0 - gap)]}, "", "gap_m_per_unit=-", None),
+        ({"states": [changed(ALL, GAP, 40.0)]}, "", "gap=NAME", None),
         ({"states": [changed(10, GAP, np.nan)]}, "", "without a number", 89),
         ({"states": [changed(10, GAP, np.inf)]}, "", "without a number", 89),
         ({"states": [changed(ALL, SECOND_FINGER, np.nan)]}, "", "without a number", None),
@@ -115,6 +116,13 @@ def test_what_is_doubtful_is_told_and_mended_by_the_option_that_is_named(
     squeeze = read(f"{folder}?{query}" if query else folder)[0]
     assert not query or not any(notice in told for told in squeeze.notices)
     assert mended in (None, len(squeeze.recording.readings))
+
+
+@pytest.mark.slow
+def test_a_force_that_begins_half_a_second_after_the_fingers_came_to_rest_is_told(tmp_path):
+    late = changed(ALL, slice(3, None), lambda cells: np.roll(cells, 15, axis=0))
+    told = printed("import", f"lerobot:{write_set(tmp_path / 'set', 3, [late])}", "--check")
+    assert "force come late" in " ".join(told.split())
 
 
 def test_the_options_of_gap_and_time_are_used(tmp_path):

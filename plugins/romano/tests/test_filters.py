@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from graspsense_romano.filters import NOT_BEGUN, RIPPLE_DB, band_pass, band_passed, low_pass
-from graspsense_romano.signals import filters
+from graspsense_romano.signals import FILTERS
 
 
 def printed(value, digits=4):
@@ -14,13 +14,13 @@ def printed(value, digits=4):
 
 
 def test_the_published_coefficients_to_their_printed_digits():
-    pads, palm = filters().low, filters().acceleration
+    pads, palm = FILTERS.low, FILTERS.acceleration
     assert [printed(x) for x in pads] == ["0.6323", "-0.6294", "-0.2647"]  # pressure_observer.cpp
     # acceleration_observer.cpp prints a2 as -0.6610: -0.66096.
     assert [printed(x) for x in palm] == ["0.8305", "-0.3329", "-0.6610"]
     assert [printed(x) for x in low_pass(1000.0, 1.0 / 3000.0)] == ["0.6340", "0.2679"]
     # 1 / (1 + 2 pi 5 Hz 0.041 s), pressure_observer.cpp
-    assert filters().high == pytest.approx(0.437, abs=5e-4)
+    assert FILTERS.high == pytest.approx(0.437, abs=5e-4)
 
 
 @pytest.mark.slow
@@ -68,7 +68,7 @@ def test_a_constant_gives_no_transient(constant):
     """The published controller begins at zero, so that gravity itself was a shock."""
     state = NOT_BEGUN
     for _ in range(50):
-        state = band_passed(filters().acceleration, state, constant)
+        state = band_passed(FILTERS.acceleration, state, constant)
         assert state.y1 == 0.0
 
 

@@ -25,7 +25,7 @@ from graspsense.plugin_api import (
 from graspsense_romano.events import EVENTS, NOTHING, EventThresholds, begun, conditions, placed, slips
 from graspsense_romano.filters import NOT_BEGUN
 from graspsense_romano.laws import Servo, force_rate, grab_force, raised_force
-from graspsense_romano.signals import PadSignal, filters, no_signals, updated
+from graspsense_romano.signals import FILTERS, NO_SIGNALS, PadSignal, updated
 
 CONTROLLERS = ("find-contact", "force-servo", "slip-servo", "grab", "release", "pick-and-place")
 THRESHOLDS = EventThresholds(1.2, 0.1, 0.007, 0.048, 0.18, 0.008, 0.2, 3.25, 1)
@@ -92,25 +92,25 @@ def test_placing_is_told_by_the_published_conditions(place_by, with_shock, with_
 
 def test_gravity_is_no_shock_and_every_sample_of_a_tick_counts():
     """The published controller looks at the last sample of a tick alone, and begins its filter at zero."""
-    signals = no_signals()
+    signals = NO_SIGNALS
     for k in range(100):
-        signals = updated(filters(), signals, reading(k * 0.001, 0.0, palm(9.8, 9.8, 9.8)))
+        signals = updated(FILTERS, signals, reading(k * 0.001, 0.0, palm(9.8, 9.8, 9.8)))
         assert conditions(THRESHOLDS, signals).shock == 0
-    signals = updated(filters(), signals, reading(0.1, 0.0, palm(9.8, 20.0, 9.8)))
+    signals = updated(FILTERS, signals, reading(0.1, 0.0, palm(9.8, 20.0, 9.8)))
     assert conditions(THRESHOLDS, signals).shock == 1
 
 
 def test_a_gripper_with_other_signals_has_no_acceleration():
     for signals in ((), OtherSignals(20.0)):
-        assert updated(filters(), no_signals(), reading(0.0, 0.0, signals)).acceleration.present == 0
+        assert updated(FILTERS, NO_SIGNALS, reading(0.0, 0.0, signals)).acceleration.present == 0
 
 
 def test_pads_are_sampled_every_41_ms_whatever_the_tick():
     for dt_s in (0.001, 0.0003):
-        signals, times = no_signals(), []
+        signals, times = NO_SIGNALS, []
         for k in range(int(0.5 / dt_s)):
             frame = reading(k * dt_s, 1.0).frame._replace(dt_s=dt_s)
-            signals = updated(filters(), signals, Reading(frame, NO_PADS))
+            signals = updated(FILTERS, signals, Reading(frame, NO_PADS))
             if signals.fresh:
                 times.append(k * dt_s)
         assert all(abs(b - a - 0.041) <= dt_s for a, b in pairwise(times))

@@ -21,16 +21,23 @@ SHAKEN_S, HELD_S = (1.0, 2.0), 3.0
 CARRIED_KG = 0.3
 
 
-def grasp(acceleration=True, shake=True, held_s=HELD_S, pad_hz=RATE_HZ):
-    """Return a grasp of 3 s that is shaken at 3 Hz from 1 to 2 s, and wobbles at 5 Hz after that, fading with 2 1/s."""
+def grasp(
+    acceleration=True, shake=True, held_s=HELD_S, pad_hz=RATE_HZ, shake_hz=3.0, until_s=2.0, hole_s=None
+):
+    """Return a grasp of 3 s that is shaken at 3 Hz from 1 to 2 s, and wobbles at 5 Hz after that, fading with 2 1/s.
+
+    Of the acceleration, the samples in the time `hole_s` are missing.
+    """
     t_s = np.arange(int(HELD_S * RATE_HZ)) / RATE_HZ
     fast_s = np.arange(int(HELD_S * FAST_HZ)) / FAST_HZ
+    if hole_s is not None:
+        fast_s = fast_s[(fast_s < hole_s[0]) | (fast_s > hole_s[1])]
 
     def moved(t_s):
-        return 2.0 * np.sin(2 * np.pi * 3.0 * t_s) * ((t_s >= SHAKEN_S[0]) & (t_s <= SHAKEN_S[1]))
+        return 2.0 * np.sin(2 * np.pi * shake_hz * t_s) * ((t_s >= SHAKEN_S[0]) & (t_s <= until_s))
 
     def wobble(t_s):
-        since_s = np.maximum(t_s - SHAKEN_S[1], 0.0)
+        since_s = np.maximum(t_s - until_s, 0.0)
         return np.exp(-2.0 * since_s) * np.sin(2 * np.pi * 5.0 * since_s)
 
     imaged_s = np.floor(t_s * pad_hz) / pad_hz
@@ -87,6 +94,20 @@ def test_a_shaken_thing_gives_its_mass_and_what_follows():
         (grasp(held_s=0.9), ["pads_low", "moved_mass"], [], "hold"),
         (grasp(acceleration=False), ["acceleration_low", "acceleration_peak"], ["pads_low"], "acceleration"),
         (grasp(held_s=2.1), ["pads_peak", "pads_low_after"], ["pads_low", "moved_mass"], "after the shake"),
+        (grasp(shake_hz=30.0), ["moved_mass"], ["acceleration_mid", "pads_mid", "pads_decay"], "faster"),
+        (
+            grasp(until_s=1.25),
+            ["pads_low", "acceleration_low"],
+            ["pads_mid", "pads_peak"],
+            "too short",
+        ),
+        (
+            grasp(hole_s=(1.2, 1.5)),
+            ["acceleration_low", "acceleration_high"],
+            ["pads_low", "acceleration_decay"],
+            "no samples",
+        ),
+        (grasp(hole_s=(2.1, 2.6)), ["acceleration_decay", "acceleration_peak"], ["moved_mass"], "no samples"),
         (grasp(pad_hz=24), ["pads_mid", "pads_high"], ["pads_low", "acceleration_high"], "samples a second"),
     ],
 )

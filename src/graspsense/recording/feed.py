@@ -22,12 +22,12 @@ from typing import Any, Final
 from graspsense.core.files.whole_file import SaveFailed
 from graspsense.core.values.signals import Command, Reading
 from graspsense.recording.layout import (
+    HEAD_WIRE,
     IS_METADATA,
     IS_SIGNAL,
     IS_TICK,
     IS_TOPIC,
-    LENGTH_WIRE,
-    SIGNAL_WIRE,
+    TICK,
     TICK_WIRE,
     Topic,
     pads_topic,
@@ -46,10 +46,10 @@ _MOST_BEFORE_A_TICK: Final = select.PIPE_BUF - TICK_WIRE.size
 """Bytes of other messages beside a tick up to which a write is atomic."""
 
 
-def metadata_message(name: str, values: Any) -> bytes:
-    """Return the message that passes JSON values under a name."""
-    body = json.dumps([name, values]).encode()
-    return LENGTH_WIRE.pack(IS_METADATA, len(body)) + body
+def json_message(kind: bytes, *values: Any) -> bytes:
+    """Return the message of this kind that passes JSON values."""
+    body = json.dumps(values).encode()
+    return HEAD_WIRE.pack(kind, len(body), 0) + body
 
 
 class _Channel:
@@ -60,7 +60,7 @@ class _Channel:
 
     def __init__(self, number: int, topic: Topic) -> None:
         body = topic.wire
-        wire = struct.Struct(SIGNAL_WIRE.format + body.format.removeprefix("<"))
+        wire = struct.Struct(HEAD_WIRE.format + body.format.removeprefix("<"))
         self.head = (IS_SIGNAL, body.size, number)
         self.pack_into, self.size = wire.pack_into, wire.size
 
@@ -140,7 +140,7 @@ class Feed:
             t_s, counter, left, right = pads
             channel.pack_into(self._buffer, offset, *channel.head, t_s, counter, *left, *right)
             offset += channel.size
-        _pack_tick(self._buffer, offset, IS_TICK, *frame, phase, *command)
+        _pack_tick(self._buffer, offset, IS_TICK, TICK.size, 0, *frame, phase, *command)
         data = self._view[: offset + TICK_WIRE.size]
         if self._waiting or offset > _MOST_BEFORE_A_TICK:
             self._send(data)
@@ -155,8 +155,7 @@ class Feed:
         self.ticks += 1
 
     def _announce(self, topic: Topic) -> _Channel:
-        body = json.dumps([topic.name, topic.type_name, topic.definition]).encode()
-        self._send(LENGTH_WIRE.pack(IS_TOPIC, len(body)) + body)
+        self._send(json_message(IS_TOPIC, topic.name, topic.type_name, topic.definition))
         self._announced += 1
         channel = _Channel(self._announced - 1, topic)
         # The messages that are in the buffer already stay where they are.
@@ -166,7 +165,7 @@ class Feed:
 
     def _told(self, name: str, values: Any) -> None:
         """Pass on JSON values under a name."""
-        self._send(metadata_message(name, values))
+        self._send(json_message(IS_METADATA, name, values))
 
     def _send(self, data: Data) -> None:
         waiting = self._waiting
@@ -189,23 +188,19 @@ class Feed:
         self._most_waiting = max(self._most_waiting, len(self._waiting))
 
     def _write(self, data: Data) -> bool:
-        """Write to the pipe. Return whether it took the data; a pipe without a reader counts as taking everything."""
+        """Write to the pipe. Return whether it took the data; a pipe without a reader counts as taking everything.
+
+        What it does not take of data that are longer than `PIPE_BUF` is written first with the next tick.
+        """
         if self._broken:
             return True
         try:
-            # Shorter than PIPE_BUF, so that the write is atomic; what is longer is written in parts, see _write_long.
-            if len(data) > select.PIPE_BUF:
-                return self._write_long(data)
-            os.write(self._fd, data)
+            written = os.write(self._fd, data)
         except BlockingIOError:
             return False
         except OSError:
             self._broken = True
-        return True
-
-    def _write_long(self, data: Data) -> bool:
-        """Write data that the pipe may take in part: what it does not take is written first with the next tick."""
-        written = os.write(self._fd, data)
+            return True
         if written < len(data):
             unwritten = bytes(data[written:])
             if self._waiting and self._waiting[0] is data:

@@ -52,18 +52,9 @@ def _schema(fields: tuple[str, ...]) -> bytes:
     return "".join(f"{kind} {name}\n" for kind, name in zip(kinds, fields, strict=True)).encode()
 
 
-def _code(fields: tuple[str, ...]) -> str:
-    return "".join("q" if name in _INTEGERS else "d" for name in fields)
-
-
-TICK: Final = struct.Struct("<" + _code(TICK_FIELDS))
-TICK_SCHEMA: Final = ("graspsense_msgs/msg/Tick", _schema(TICK_FIELDS))
-"""The name of the message type of a tick, and the definition of that type."""
-
-
 @frozen
 class Topic:
-    """A topic beside the ticks: its name, the name of its message type, the definition of the type.
+    """A topic: its name, the name of its message type, the definition of the type.
 
     Every type begins with `t_s`. Its other fields are float64 or int64, alone or a fixed number of them; the last one
     may be a fixed number of uint8, uint16 or float32. Raises ValueError for any other definition.
@@ -91,9 +82,11 @@ class Topic:
             raise ValueError(f"{self.name} has other fields than graspsense writes")
         return tuple(fields)
 
-    @property
-    def wire(self) -> struct.Struct:
-        """The structure of a message; an array of small numbers is packed as its bytes."""
+    wire: struct.Struct = field(init=False, eq=False)
+    """The structure of a message; an array of small numbers is packed as its bytes."""
+
+    @wire.default
+    def _wire(self) -> struct.Struct:
         return struct.Struct("<" + "".join(_packed(kind, number) for _, kind, number in self.fields))
 
 
@@ -105,6 +98,12 @@ KINDS: Final = {"d": "float64", "q": "int64", "f": "float32", "H": "uint16", "B"
 """The types of the numbers of a field, by their code in a packed structure."""
 _KIND_OF: Final = {name: kind for kind, name in KINDS.items()}
 _FIELD: Final = re.compile(rf"({'|'.join(_KIND_OF)})(?:\[([1-9][0-9]{{0,17}})\])? ([a-z][a-z0-9_]*)")
+
+
+TICKS: Final = Topic(TICK_TOPIC, "graspsense_msgs/msg/Tick", _schema(TICK_FIELDS).decode())
+"""The topic of the ticks."""
+TICK: Final = TICKS.wire
+TICK_SCHEMA: Final = (TICKS.type_name, TICKS.definition.encode())
 
 
 def pads_topic(cells: int) -> Topic:
@@ -229,11 +228,12 @@ EVENT: Final = "graspsense.event."
 written when the event happens, so that a grasp that is cut off keeps its events; the result lists them once more. It is
 a map of texts: `event` is JSON."""
 
-# Protocol to the writer process: one byte for the kind of message, then a body. Ticks have a fixed length. Others state
-# their length first, and those of a topic its number, in the order in which the topics were announced.
-TICK_WIRE: Final = struct.Struct("<c" + _code(TICK_FIELDS))
-LENGTH_WIRE: Final = struct.Struct("<cI")
-SIGNAL_WIRE: Final = struct.Struct("<cIH")
+HEAD_WIRE: Final = struct.Struct("<cIH")
+"""The head of a message to the writer process: its kind, the length of its body, the number of its topic, or 0.
+
+Topics are numbered in the order in which they were announced."""
+TICK_WIRE: Final = struct.Struct(HEAD_WIRE.format + TICK.format.removeprefix("<"))
+"""The head and the body of a tick."""
 IS_TICK: Final = b"T"
 IS_SIGNAL: Final = b"S"
 IS_TOPIC: Final = b"A"

@@ -27,8 +27,8 @@ from graspsense.recording.layout import (
     SIGNAL_TOPIC,
     START,
     TICK,
-    TICK_SCHEMA,
     TICK_TOPIC,
+    TICKS,
     VERSION,
     Topic,
     pads_topic,
@@ -37,7 +37,7 @@ from graspsense.recording.layout import (
 )
 from graspsense.recording.mcap_records import MAGIC, records_in, records_of
 from graspsense.recording.readable import readable, refuse_devices
-from graspsense.recording.recorded_grasp import TICK_ROW, RecordedGrasp, TopicRows, row_type
+from graspsense.recording.recorded_grasp import RecordedGrasp, TopicRows, row_type
 from graspsense.recording.replayable import Recording
 from graspsense.recording.trial_record import DeviceRecord
 from graspsense.recording.unpacked import Unpacked
@@ -204,9 +204,9 @@ class _PartialGrasp:
                     next_tick=tuple(self.next_tick[name]),
                 )
                 for name, topic in self.layouts.items()
-                if self.bodies[name]
+                if self.bodies[name] and name != TICK_TOPIC
             }
-            ticks = np.frombuffer(b"".join(self.bodies[TICK_TOPIC]), dtype=TICK_ROW)
+            ticks = np.frombuffer(b"".join(self.bodies[TICK_TOPIC]), dtype=row_type(TICKS))
         problem = _impossible(ticks)
         if problem:
             raise DataDamaged(f"the recording {self.path} is damaged: {problem}")
@@ -230,14 +230,9 @@ class _PartialGrasp:
             name = record.topic
             if name not in (TICK_TOPIC, PADS_TOPIC, SCALARS_TOPIC) and not name.startswith(SIGNAL_TOPIC):
                 return  # a topic of another program
-            if schema is None or record.message_encoding != "cdr":
-                raise ValueError(f"the fields of {name} are not those of this version")
-            if name == TICK_TOPIC:
-                known = schema.data == TICK_SCHEMA[1]
-            else:
-                layout = Topic(name, schema.name, schema.data.decode())
-                known = _is_ours(layout) and self.layouts.setdefault(name, layout) == layout
-            if not known:
+            layout = None if schema is None else Topic(name, schema.name, schema.data.decode())
+            known = layout is not None and record.message_encoding == "cdr" and _is_ours(layout)
+            if layout is None or not known or self.layouts.setdefault(name, layout) != layout:
                 raise ValueError(f"the fields of {name} are not those of this version")
             self.bodies.setdefault(name, [])
             self.next_tick.setdefault(name, [])
@@ -247,14 +242,12 @@ class _PartialGrasp:
             topic = self.topics.get(record.channel_id)
             if topic is None:
                 return
-            wire = TICK if topic == TICK_TOPIC else self.layouts[topic].wire
-            size = len(CDR_HEADER) + wire.size
+            size = len(CDR_HEADER) + self.layouts[topic].wire.size
             if len(record.data) != size or record.data[:4] != CDR_HEADER:
                 raise ValueError(f"a message of {topic} has {len(record.data)} bytes, not {size}")
             self.lost += (record.sequence - self.next_number[topic]) & 0xFFFFFFFF
             self.next_number[topic] = (record.sequence + 1) & 0xFFFFFFFF
-            if topic != TICK_TOPIC:
-                self.next_tick[topic].append(len(self.bodies[TICK_TOPIC]))
+            self.next_tick[topic].append(len(self.bodies[TICK_TOPIC]))
             if self.base_ns is None:
                 (t_s,) = struct.unpack_from("<d", record.data, len(CDR_HEADER))
                 self.base_ns = record.log_time - round(t_s * 1e9)
@@ -264,6 +257,8 @@ class _PartialGrasp:
 def _is_ours(topic: Topic) -> bool:
     """Return whether a topic has the fields that graspsense writes under its name."""
     names = [name for name, _, _ in topic.fields]
+    if topic.name == TICK_TOPIC:
+        return topic.definition == TICKS.definition
     if topic.name == PADS_TOPIC:
         if names == ["t_s", "counter", "left", "right"]:
             return topic.definition == pads_topic(topic.fields[-1][2]).definition

@@ -42,8 +42,6 @@ from graspsense.recording.layout import (
     PADS_TOPIC,
     SCALARS_TOPIC,
     SIGNAL_TOPIC,
-    TICK,
-    TICK_FIELDS,
     Topic,
     pads_topic,
     shown_array,
@@ -53,10 +51,6 @@ from graspsense.recording.replayable import REPLAY_NOTE, Recording, trace_of_rea
 from graspsense.recording.trial_record import DeviceRecord, TrialRecord
 
 _KINDS: Final = {kind: np.dtype(name).newbyteorder("<") for kind, name in KINDS.items()}
-TICK_ROW: Final = np.dtype(
-    [(name, _KINDS[code]) for name, code in zip(TICK_FIELDS, TICK.format.removeprefix("<"), strict=True)]
-)
-"""The type of a row with the fields of a tick."""
 
 
 def row_type(topic: Topic) -> np.dtype[np.void]:

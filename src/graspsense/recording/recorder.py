@@ -15,14 +15,9 @@ from typing import Any, Final
 from graspsense.core.files.whole_file import SaveFailed
 from graspsense.core.values.json_values import json_text
 from graspsense.core.values.signals import GraspEvent, event_as_json
-from graspsense.recording.feed import Feed, metadata_message
-from graspsense.recording.layout import (
-    EVENT,
-    IS_END,
-    PART,
-    READY,
-)
-from graspsense.recording.recording_info import RecordingInfo
+from graspsense.recording.feed import Feed, json_message
+from graspsense.recording.layout import EVENT, IS_END, IS_METADATA, PART, READY
+from graspsense.recording.recording_info import WRITTEN, RecordingInfo
 
 QUEUE_BYTES: Final = 256 << 20
 """Limit on the messages that wait for the pipe."""
@@ -63,19 +58,16 @@ class Recorder(Feed):
 
     def metadata(self, name: str, values: Mapping[str, str]) -> None:
         """Pass on a metadata record and wait until the pipe has taken it. Do not call this during control."""
-        self._drain(metadata_message(name, dict(values)), ANSWER_TIMEOUT_S)
+        self._drain(json_message(IS_METADATA, name, dict(values)), ANSWER_TIMEOUT_S)
 
     def finish(self) -> RecordingInfo:
         """Wait until the recording is complete on the disk. Raises SaveFailed with the reason if it is not."""
-        answer = self._final_answer(IS_END)
+        answer = self._final_answer(json_message(IS_END))
         if answer is None or "sha256" not in answer:
             raise self._failure(answer)
         return RecordingInfo(
             path=self.path,
-            sha256=answer["sha256"],
-            size=answer["size"],
-            ticks=answer["ticks"],
-            images=answer["images"],
+            **{name: answer[name] for name in WRITTEN},
             deferred=self._deferred,
             most_waiting=self._most_waiting,
             dropped=self._dropped,

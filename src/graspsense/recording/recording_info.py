@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import hashlib
 from pathlib import Path
+from typing import Final
 
 from attrs import asdict, frozen
+
+WRITTEN: Final = ("sha256", "size", "ticks", "images")
+"""What the process that writes a recording says of it at the end."""
 
 
 @frozen(kw_only=True)

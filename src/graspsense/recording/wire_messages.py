@@ -6,40 +6,17 @@ import os
 import signal
 from collections.abc import Iterator
 
-from graspsense.recording.layout import (
-    IS_END,
-    IS_METADATA,
-    IS_SIGNAL,
-    IS_TICK,
-    IS_TOPIC,
-    LENGTH_WIRE,
-    SIGNAL_WIRE,
-    TICK_WIRE,
-)
+from graspsense.recording.layout import HEAD_WIRE
 
 
 def complete_messages(buffer: bytearray) -> Iterator[tuple[bytes, int, bytes]]:
     """Remove every complete message from the buffer, and yield its kind, the number of its topic (or 0), its body."""
-    offset, end = 0, len(buffer)
+    offset = 0
     try:
-        while offset < end:
-            kind, number = bytes(buffer[offset : offset + 1]), 0
-            if kind == IS_END:
-                start, length = offset + 1, 0
-            elif kind == IS_TICK:
-                start, length = offset + 1, TICK_WIRE.size - 1
-            elif kind == IS_SIGNAL:
-                start = offset + SIGNAL_WIRE.size
-                if start > end:
-                    break
-                _, length, number = SIGNAL_WIRE.unpack_from(buffer, offset)
-            else:
-                assert kind in (IS_METADATA, IS_TOPIC)
-                start = offset + LENGTH_WIRE.size
-                if start > end:
-                    break
-                length = LENGTH_WIRE.unpack_from(buffer, offset)[1]
-            if start + length > end:
+        while offset + HEAD_WIRE.size <= len(buffer):
+            kind, length, number = HEAD_WIRE.unpack_from(buffer, offset)
+            start = offset + HEAD_WIRE.size
+            if start + length > len(buffer):
                 break
             offset = start + length
             yield kind, number, bytes(buffer[start:offset])

@@ -67,9 +67,9 @@ class RecordingWriter:
         """Write a metadata record, outside of any chunk."""
         self._mcap.add_metadata(name, dict(values))
 
-    def tick(self, t_s: float, body: bytes) -> None:
+    def tick(self, body: bytes) -> None:
         """Write a tick, packed as `layout.TICK`."""
-        self._add(TICK_TOPIC, t_s, body)
+        self._add(TICK_TOPIC, body)
 
     def topic(self, topic: Topic) -> int:
         """Add a topic, and return its number."""
@@ -79,8 +79,7 @@ class RecordingWriter:
 
     def signal(self, number: int, body: bytes) -> None:
         """Write a message of the topic with this number, packed as `Topic.wire`."""
-        (t_s,) = _T_S.unpack_from(body)
-        self._add(self._topics[number], t_s, body)
+        self._add(self._topics[number], body)
 
     def finish(self) -> RecordingInfo:
         """Finish the file, wait until the disk has it, and give it its final name."""
@@ -115,8 +114,8 @@ class RecordingWriter:
         self._mcap.finish()  # type: ignore[no-untyped-call]
         os.fsync(self._out.fd)
 
-    def _add(self, topic: str, t_s: float, body: bytes) -> None:
-        now_ns = time.time_ns()
+    def _add(self, topic: str, body: bytes) -> None:
+        now_ns, (t_s,) = time.time_ns(), _T_S.unpack_from(body)
         log_ns = self._clock.log_ns(t_s, now_ns)
         if not self._open_chunk:
             self._open_chunk, self._chunk_log_ns, self._chunk_wall_ns = True, log_ns, now_ns

@@ -10,19 +10,18 @@ from __future__ import annotations
 
 import json
 import os
-import struct
 import sys
 import time
 from pathlib import Path
 from typing import Final
 
 from graspsense.recording.layout import IS_END, IS_SIGNAL, IS_TICK, IS_TOPIC, READY, Topic
+from graspsense.recording.recording_info import WRITTEN
 from graspsense.recording.wire_messages import complete_messages, leave_control_alone
 from graspsense.recording.writer import RecordingWriter
 
 READ_EVERY_S: Final = 0.01
 READ_BYTES: Final = 1 << 20
-_T_S: Final = struct.Struct("<d")
 BEHIND: Final = 1 << 16
 """A read of this many bytes or more is followed by the next read without a pause."""
 
@@ -56,12 +55,7 @@ def _write(path: Path) -> dict[str, object]:
         buffer += data
         if _write_messages(file, buffer):
             written = file.finish()
-            return {
-                "sha256": written.sha256,
-                "size": written.size,
-                "ticks": written.ticks,
-                "images": written.images,
-            }
+            return {name: getattr(written, name) for name in WRITTEN}
         if len(data) < BEHIND:
             time.sleep(READ_EVERY_S)
 
@@ -72,7 +66,7 @@ def _write_messages(file: RecordingWriter, buffer: bytearray) -> bool:
         if kind == IS_END:
             return True
         if kind == IS_TICK:
-            file.tick(_T_S.unpack_from(body)[0], body)
+            file.tick(body)
         elif kind == IS_SIGNAL:
             file.signal(number, body)
         elif kind == IS_TOPIC:

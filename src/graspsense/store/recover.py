@@ -128,7 +128,7 @@ def write_copy(grasp: RecordedGrasp, path: Path) -> RecordingInfo:
             while messages and messages[-1][0] <= k:
                 _, number, topic, i = messages.pop()
                 file.signal(number, topic.topic.wire.pack(*topic.numbers(i)))
-            file.tick(row[0], TICK.pack(*row))
+            file.tick(TICK.pack(*row))
         for name in grasp.metadata:
             if name not in (START, DEVICE):
                 file.metadata(name, grasp.metadata[name])

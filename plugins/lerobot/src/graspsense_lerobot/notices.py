@@ -96,13 +96,11 @@ def moments_of(columns: GraspColumns) -> str:
     )
 
 
-def notices_of_sign(columns: GraspColumns) -> tuple[str, ...]:
-    """Return a notice if the gap grows while the force rises."""
-    force = np.nan_to_num(columns.force_n)
-    peak = int(force.argmax())
-    span = float(np.ptp(columns.gap_m))
-    if span > 0.0 and columns.gap_m[peak] > columns.gap_m[0] + 0.3 * span:
-        return (
-            "the number of the gap grows while the force rises: if it is closed there, ?gap_m_per_unit=-0.001",
-        )
-    return ()
+def notices_of_gap(columns: GraspColumns) -> Iterator[str]:
+    """Yield that the gap of a squeeze stays, or grows while the force rises."""
+    force, gap = np.nan_to_num(columns.force_n), columns.gap_m
+    span = float(np.ptp(gap))
+    if span == 0.0:
+        yield "the number of the gap stays the same: if the fingers moved, ?gap=NAME chooses another one"
+    elif gap[int(force.argmax())] > gap[0] + 0.3 * span:
+        yield "the number of the gap grows while the force rises: if it is closed there, ?gap_m_per_unit=-0.001"

@@ -28,7 +28,7 @@ from graspsense.plugin_api import (
 )
 from graspsense_lerobot.folder import DataColumn, Episode, read_folder
 from graspsense_lerobot.names import CellArray, channel_name
-from graspsense_lerobot.notices import LONG_STEP, moments_of, notices_of, notices_of_sign, repeated_frames
+from graspsense_lerobot.notices import LONG_STEP, moments_of, notices_of, notices_of_gap, repeated_frames
 from graspsense_lerobot.place import folder_and_options
 from graspsense_lerobot.understood import (
     Understood,
@@ -118,7 +118,7 @@ def _grasp(
         + ("" if (understood.folder.place / path).is_file() else ", which is missing")
         for key, (path, first_s) in episode.videos.items()
     ]
-    inverted = notices_of_sign(columns)
+    of_gap = tuple(notices_of_gap(columns))
     moved = evolve(
         columns,
         t_s=columns.t_s - start_s,
@@ -131,7 +131,7 @@ def _grasp(
             source=columns.source,
             label=label_of_task(episode.task),
             order=episode.index + number / 1000.0,
-            notices=(*columns.warnings, *inverted),
+            notices=(*columns.warnings, *of_gap),
         ),
     )
 

@@ -49,7 +49,7 @@ from graspsense_romano.events import (
     placed,
 )
 from graspsense_romano.laws import PositionServo, Servo, force_rate, grab_force, raised_force, servo_effort
-from graspsense_romano.signals import Filters, Signals, filters, no_signals, updated
+from graspsense_romano.signals import FILTERS, NO_SIGNALS, Filters, Signals, updated
 
 CHANNELS: Final[tuple[Channel, ...]] = (
     Channel("gap", "m"),
@@ -362,7 +362,7 @@ class _Romano(Controller[ConfigT]):
         return Params(
             kind=KINDS[config.sends],
             plan=HoldingPlan(loads, grabs, slips, places, **_of(HoldingPlan._fields, own)),
-            filters=filters(),
+            filters=FILTERS,
             thresholds=EventThresholds(
                 **_of(EventThresholds._fields, own), place_by=PLACE_BY.index(config.place_by)
             ),
@@ -383,7 +383,7 @@ class _Romano(Controller[ConfigT]):
             events=0,
             progress=progress,
             wanted_m=0.0,
-            signals=no_signals(),
+            signals=NO_SIGNALS,
             conditions=NOTHING,
         )
 

@@ -16,7 +16,8 @@ With n samples x_k at the rate r, less their mean, and Hann's window w_k, densit
 so that a sine of the amplitude A has the rms A / sqrt 2 in its band. The peak is the frequency from 1 to 50 Hz of the
 largest density after the shake. The decay is the slope of -ln rms of the band low over four equal stretches after the
 shake. moved_mass is the rms of the pads over that of the acceleration, both of the band low during the shake: of a
-shake along the closing direction, the mass that the pads move.
+shake along the closing direction, the mass that the pads move. It is missing where the shake itself is not in that
+band, an rms where its band has fewer than three lines of the spectrum, and all of a signal where samples are missing.
 """
 
 from __future__ import annotations
@@ -36,6 +37,13 @@ PEAK_HZ: Final = (1.0, 50.0)
 PADDED: Final = 8
 """The spectrum whose peak is sought is that of so many times the samples, most of them zero."""
 STRETCHES: Final = 4
+LINES: Final = 3
+"""Fewest lines of a spectrum in a band that show its rms."""
+LONGEST_HOLE_S: Final = 0.05
+"""A time without samples that is longer (s), and than so many usual ones, hides what is in the band low."""
+HOLE_STEPS: Final = 5.0
+SLOW_SHARE: Final = 0.5
+"""Least share of the shake in the band low with which forces and accelerations there are those of the shake."""
 MOVED_SHARE: Final = 0.02
 LEAST_SAMPLES: Final = 16
 SIGNALS: Final = {"acceleration": "m/s2", "pads": "N"}
@@ -110,7 +118,10 @@ class ShakeFeatures(FeatureSet[ShakeConfig]):
             values[f"{name}_decay"] = after if isinstance(after, str) else decay_1_s(after)
         force, acceleration = values["pads_low"], values["acceleration_low"]
         values["moved_mass"] = "the pads or the acceleration are missing, or not moved"
-        if isinstance(force, float) and isinstance(acceleration, float) and acceleration:
+        shake = _signal(trace, "shake", begin_s, end_s)
+        if isinstance(shake, Signal) and rms(shake, *BANDS_HZ["low"]) < SLOW_SHARE * shake.values.std():
+            values["moved_mass"] = "it is shaken faster or slower than the band low"
+        elif isinstance(force, float) and isinstance(acceleration, float) and acceleration:
             values["moved_mass"] = force / acceleration
         reasons = {name: reason for name, reason in values.items() if isinstance(reason, str)}
         return self.result(
@@ -135,8 +146,9 @@ def _signal(trace: Trace, name: str, begin_s: float, end_s: float) -> Signal | s
     """Return a signal from one time to another, evenly spaced, or the reason why there is none."""
     t_s: Any
     values: Any
-    if name == "pads":
-        t_s, values = trace.t_s, (trace.force_left_n - trace.force_right_n)[:, np.newaxis]
+    if name in ("pads", "shake"):
+        pads = trace.force_left_n - trace.force_right_n
+        t_s, values = trace.t_s, (pads if name == "pads" else trace.signals[name])[:, np.newaxis]
     else:
         samples = trace.signals.get(name)
         t_s, values = getattr(samples, "t_s", None), getattr(samples, "values", None)
@@ -144,6 +156,9 @@ def _signal(trace: Trace, name: str, begin_s: float, end_s: float) -> Signal | s
             return f"there is no fast channel `{name}`"
     within = (t_s > begin_s) & (t_s <= end_s) & np.isfinite(values).all(axis=1)
     t_s, values = t_s[within], values[within]
+    steps = np.diff(t_s)
+    if len(steps) and steps.max() > max(LONGEST_HOLE_S, HOLE_STEPS * float(np.median(steps))):
+        return f"{name}: no samples for {steps.max():.2g} s there"
     # What is repeated between two images of the pads is not a sample.
     new = np.append(len(values) > 0, (np.diff(values, axis=0) != 0.0).any(axis=1))[: len(values)]
     t_s, values = t_s[new], values[new]
@@ -174,6 +189,8 @@ def _rms_or_reason(signal: Signal | str, band: str) -> float | str:
     if isinstance(signal, str):
         return signal
     low_hz, high_hz = BANDS_HZ[band]
+    if (seconds := len(signal.values) / signal.rate_hz) < LINES / (high_hz - low_hz):
+        return f"{seconds:.2g} s are too short for {low_hz:g} to {high_hz:g} Hz"
     if 0.5 * signal.rate_hz < 0.95 * high_hz:
         return f"{signal.rate_hz:.3g} samples a second do not show {low_hz:g} to {high_hz:g} Hz"
     return rms(signal, low_hz, high_hz)

@@ -7,7 +7,7 @@ filters are linear, so the sum of the cells is filtered instead of each cell.
 from __future__ import annotations
 
 from math import sqrt
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from graspsense.plugin_api import Frame, Reading, Samples
 from graspsense_romano.filters import (
@@ -76,35 +76,29 @@ class Signals(NamedTuple):
     """The rate of the gap as it was measured."""
 
 
-def filters() -> Filters:
-    """Return the published filters.
+FILTERS: Final = Filters(
+    sample_s=PAD_SAMPLE_S,
+    high=high_pass(PAD_HIGH_HZ, PAD_SAMPLE_S),
+    low=band_pass(*PAD_LOW_HZ, PAD_SAMPLE_S),
+    acceleration=band_pass(*ACCELERATION_HZ, ACCELERATION_SAMPLE_S),
+    speed_hz=SPEED_HZ,
+)
+"""The published filters.
 
-    That of the acceleration is for the 3 kHz of the PR2's sensor. Other rates move its band in proportion.
-    """
-    return Filters(
-        sample_s=PAD_SAMPLE_S,
-        high=high_pass(PAD_HIGH_HZ, PAD_SAMPLE_S),
-        low=band_pass(*PAD_LOW_HZ, PAD_SAMPLE_S),
-        acceleration=band_pass(*ACCELERATION_HZ, ACCELERATION_SAMPLE_S),
-        speed_hz=SPEED_HZ,
-    )
-
-
-def no_signals() -> Signals:
-    """Return the signals before the first tick."""
-    pad = PadSignal(0, 0.0, 0.0, NOT_BEGUN)
-    acceleration = Acceleration(present=0, x=NOT_BEGUN, y=NOT_BEGUN, z=NOT_BEGUN, norm_m_s2=0.0)
-    return Signals(
-        fresh=0,
-        sampled_s=0.0,
-        left=pad,
-        right=pad,
-        edge_left=pad,
-        edge_right=pad,
-        acceleration=acceleration,
-        speed_m_s=0.0,
-        rate_m_s=0.0,
-    )
+That of the acceleration is for the 3 kHz of the PR2's sensor. Other rates move its band in proportion."""
+_NO_PAD: Final = PadSignal(0, 0.0, 0.0, NOT_BEGUN)
+NO_SIGNALS: Final = Signals(
+    fresh=0,
+    sampled_s=0.0,
+    left=_NO_PAD,
+    right=_NO_PAD,
+    edge_left=_NO_PAD,
+    edge_right=_NO_PAD,
+    acceleration=Acceleration(present=0, x=NOT_BEGUN, y=NOT_BEGUN, z=NOT_BEGUN, norm_m_s2=0.0),
+    speed_m_s=0.0,
+    rate_m_s=0.0,
+)
+"""The signals before the first tick."""
 
 
 def sampled(coefficients: Filters, pad: PadSignal, force_n: float) -> PadSignal:

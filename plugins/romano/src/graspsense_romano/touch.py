@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from graspsense.experiment_api import settings_from, structured
 from graspsense.plugin_api import HOLD, NO_PADS, ConfigError, Frame, Reading, Samples, Trace
 from graspsense.simulator_api import BatchBackend
-from graspsense_romano.signals import Signals, filters, no_signals, updated
+from graspsense_romano.signals import FILTERS, NO_SIGNALS, Signals, updated
 
 LIFT_S: Final = 2.0
 """When the arm lifts, after both fingers touched."""
@@ -36,6 +36,11 @@ AROUND_S: Final = (-0.05, 0.3)
 STARTING_S: Final = 0.2
 """Time in which the arm reaches its speed, and in which it stops."""
 POINTS: Final = 20
+FOLLOWED: Final = (
+    *("t_s", "gap_m", "velocity_m_s"),
+    *("force_left_n", "force_right_n", "edge_left_n", "edge_right_n"),
+)
+"""Columns of a trace that its signals follow from."""
 
 
 def _moved(start_s: float, begin_m: float, end_m: float, speed_m_s: float) -> list[list[float]]:
@@ -214,28 +219,20 @@ def touch(params: Mapping[str, Any], seed: int) -> TouchRow:
 
 def followed(trace: Trace) -> list[Signals]:
     """Return the signals after each frame of a trace."""
-    coefficients, now, signals_by_frame = filters(), no_signals(), []
+    now, signals_by_frame = NO_SIGNALS, []
     fast = trace.signals.get("acceleration")
     counts = np.zeros(0, int) if fast is None else np.searchsorted(fast.t_s, trace.t_s, side="right")
     begun = 0
-    dt_s = np.diff(trace.t_s, prepend=trace.t_s[0])
+    columns = {name: getattr(trace, name).tolist() for name in FOLLOWED}
+    columns["dt_s"] = np.diff(trace.t_s, prepend=trace.t_s[:1]).tolist()
     for k in range(len(trace)):
         signals: Any = ()
         if fast is not None:
             rows = tuple(map(tuple, fast.values[begun : counts[k]].tolist()))
             begun = counts[k]
             signals = _Fast(Samples(float(trace.t_s[k]), int(begun), len(rows), rows))
-        frame = Frame(
-            t_s=float(trace.t_s[k]),
-            dt_s=float(dt_s[k]),
-            gap_m=float(trace.gap_m[k]),
-            velocity_m_s=float(trace.velocity_m_s[k]),
-            force_left_n=float(trace.force_left_n[k]),
-            force_right_n=float(trace.force_right_n[k]),
-            edge_left_n=float(trace.edge_left_n[k]),
-            edge_right_n=float(trace.edge_right_n[k]),
-        )
-        now = updated(coefficients, now, Reading(frame, NO_PADS, signals))
+        frame = Frame(**{name: column[k] for name, column in columns.items()})
+        now = updated(FILTERS, now, Reading(frame, NO_PADS, signals))
         signals_by_frame.append(now)
     return signals_by_frame
 

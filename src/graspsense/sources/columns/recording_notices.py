@@ -6,6 +6,7 @@ Ranges are without glitches. The noise of a force is its usual second difference
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from functools import cached_property
 from itertools import pairwise
@@ -62,6 +63,8 @@ ROUGH_S: Final = 0.1
 """Time (s) over which a force is averaged: single values that are usually farther away than `SLIGHT` are not known."""
 LATE_S: Final = 0.04
 """A force or a gap that is later than this (s), and than two samples, is late."""
+CREEP: Final = 0.15
+"""Share of its range by which a force grows at rest as its sensor creeps."""
 SELDOM_S: Final = 0.05
 SELDOM_ROWS: Final = 5
 """A force or gap that keeps each value for so long, and so many samples, is measured more rarely than the rows."""
@@ -163,13 +166,15 @@ def signal_notices(recording: Recording) -> Iterator[str]:
             told += [*_glitches(force), *_seldom(force.what, force.t, force.n, FREE)]
             told += [] if doubtful else _rough(force)
         told += _drift(force)
-    yield from told or [*_rises_at_once(mean), *_falls_at_once(mean)]
+    told = told or [*_rises_at_once(mean), *_falls_at_once(mean)]
     if not {"gap", "t"} & recording.units.keys():
-        yield from _bump(mean)
-        yield from next(filter(None, map(list, map(_late, forces))), ())
+        told += _bump(mean)
         gap_mm = evolve(mean, what="the gap", n=1e3 * mean.gap, units={"force_left": "mm"})
-        yield from [*_glitches(gap_mm), *_filled(gap_mm)] or _gap_leaps(mean.t, mean.gap)
-        yield from _stopped_gap(mean)
+        told += [*_glitches(gap_mm), *_filled(gap_mm)] or _gap_leaps(mean.t, mean.gap)
+        told += _stopped_gap(mean)
+    if "t" not in recording.units:
+        told += next(filter(None, (list(_late(force, doubtful=bool(told))) for force in forces)), ())
+    yield from told
 
 
 def force_of_pads(left: Numbers, right: Numbers) -> dict[str, Numbers]:
@@ -179,10 +184,15 @@ def force_of_pads(left: Numbers, right: Numbers) -> dict[str, Numbers]:
     return {"the force of the left pad": left, "the force of the right pad": right}
 
 
-def _course(values: Numbers, longest: int) -> Numbers:
+def median_course(values: Numbers, longest: int) -> Numbers:
     """Return values without what lasts at most so many samples."""
     around = np.pad(values, longest, mode="reflect")
     return np.median(np.lib.stride_tricks.sliding_window_view(around, 2 * longest + 1), axis=1)
+
+
+def _mean(values: Numbers, width: int) -> Numbers:
+    """Return the mean of values over an odd number of samples around each."""
+    return np.convolve(np.pad(values, width // 2, mode="edge"), np.full(width, 1.0 / width), mode="valid")
 
 
 def _leap(steps: Numbers, within: NDArray[np.bool_], least: float) -> int | None:
@@ -265,14 +275,19 @@ def _numb(pad: _Force, other: _Force) -> Iterator[str]:
 
     One that touches the object late does so for a while; one that felt it before and feels it again had failed.
     """
-    span, noise = float(np.ptp(other.n)), max(pad.noise, other.noise)
-    loaded = other.n > other.low + LOADED * span
-    begin = int(loaded.argmax())
-    free = other.n[:begin] < other.low + PART * span
-    if not free.any() or not span > noise:
+    span, noise = other.span, max(pad.noise, other.noise)
+    if not other.span > 0.0:
         return
-    zero = float(np.median(pad.n[:begin][free]))
-    away = np.abs(pad.n - zero)
+    # The mean of so many samples tells a load from the noise of single ones.
+    width = 2 * int(0.5 * (noise / (FREE * span)) ** 2) + 1
+    felt_n, other_n = _mean(pad.n, width), _mean(other.n, width)
+    loaded = other_n > other.low + LOADED * span
+    begin, noise = int(loaded.argmax()), noise / math.sqrt(width)
+    free = other_n[:begin] < other.low + PART * span + noise
+    if not free.any() or width > np.count_nonzero(loaded):
+        return
+    zero = float(np.median(felt_n[:begin][free]))
+    away = np.abs(felt_n - zero)
     loaded &= pad.gap <= pad.gap[begin]
     numb, felt = loaded & (away < max(noise, SLIGHT * span)), np.flatnonzero(away > FREE * span)
     if np.count_nonzero(numb) < max(FEWEST, PART * np.count_nonzero(loaded)):
@@ -282,7 +297,7 @@ def _numb(pad: _Force, other: _Force) -> Iterator[str]:
         from_k, until_k = np.flatnonzero(numb)[[0, -1]].tolist()
         yield (
             f"{pad.what} stays at {pad.amount(zero)} from {pad.t[from_k]:.4g} to {pad.when(until_k)}, while the other "
-            f"pad feels up to {other.n[numb].max():.3g}: does its fingertip not answer, or did one finger alone touch?"
+            f"pad feels up to {other_n[numb].max():.3g}: does its fingertip not answer, or did one finger alone touch?"
         )
 
 
@@ -313,7 +328,7 @@ def _parted(left: _Force, right: _Force) -> Iterator[str]:
     if not loaded.any():
         return
     scale = float(np.median(forces[0][loaded] / forces[1][loaded]))
-    steps = np.abs(np.diff(_course(forces[0] - scale * forces[1], GLITCH_SAMPLES)))
+    steps = np.abs(np.diff(median_course(forces[0] - scale * forces[1], GLITCH_SAMPLES)))
     # Where fingers meet an object, or let it go, one of them can be first.
     held = np.flatnonzero(larger > LOADED * larger.max())
     within = loaded[1:] | loaded[:-1]
@@ -329,7 +344,7 @@ def _parted(left: _Force, right: _Force) -> Iterator[str]:
 
 def _rises_at_once(force: _Force) -> Iterator[str]:
     """Yield that a force under a load rises within a sample, as where some are missing, or after its sensor stopped."""
-    steps = np.diff(_course(force.n, GLITCH_SAMPLES))
+    steps = np.diff(median_course(force.n, GLITCH_SAMPLES))
     samples, free = np.arange(len(steps)), np.flatnonzero(~force.above(FREE))
     loaded = samples - free[np.searchsorted(free, samples, side="right") - 1] >= LOADED_SAMPLES
     k = _leap(steps, loaded, max(PART * force.span, force.noise))
@@ -345,7 +360,7 @@ def _falls_at_once(force: _Force) -> Iterator[str]:
 
     A tap on the way, which falls so as it rose, is none.
     """
-    course, gap = _course(force.n, GLITCH_SAMPLES), force.gap
+    course, gap = median_course(force.n, GLITCH_SAMPLES), force.gap
     steps, closed = np.diff(course), gap <= np.minimum.accumulate(gap) + SLIGHT * np.ptp(gap)
     k = _leap(-steps, closed[1:], max(FREE * force.span, force.noise))
     if k is None or steps.max() > LOADED * -steps[k - 1]:
@@ -363,9 +378,7 @@ def _rough(force: _Force) -> Iterator[str]:
     width = 2 * max(2, round(0.5 * ROUGH_S / float(np.median(np.diff(force.t))))) + 1
     if len(force) < 2 * width or not force.span > 0.0:
         return
-    around = np.pad(force.n, width // 2, mode="edge")
-    course = np.convolve(around, np.full(width, 1.0 / width), mode="valid")
-    varies = float(np.median(np.abs(force.n - course))) / force.span
+    varies = float(np.median(np.abs(force.n - _mean(force.n, width)))) / force.span
     steps = np.diff(np.unique(force.n))
     counts = steps / steps.min()
     if varies > SLIGHT:
@@ -393,7 +406,7 @@ def _glitches(force: _Force) -> Iterator[str]:
         (GLITCH_SAMPLES, GLITCH_S, PART * span, LOADED * span),
         (FAR_SAMPLES, max(FAR_S, step_s), np.inf, FAR),
     ):
-        course = _course(sampled, min(samples, int(longest_s / step_s)))
+        course = median_course(sampled, min(samples, int(longest_s / step_s)))
         apart, free = np.abs(sampled - course), course < course.min() + PART * np.ptp(course)
         loaded_share *= np.ptp(course) if loaded_share == FAR else 1.0
         left |= (apart > np.where(free, free_share, loaded_share)) & (apart > NOISE * np.median(apart))
@@ -447,7 +460,7 @@ def _drift(force: _Force) -> Iterator[str]:
 
 def _bump(force: _Force) -> Iterator[str]:
     """Yield that a force comes, is gone while the gap (m) closes further, and comes back, by time (s)."""
-    gap, course = force.gap, _course(force.n, 1)
+    gap, course = force.gap, median_course(force.n, 1)
     course = course - usual_range(course)[0]
     least = PART * float(np.ptp(course))
     contact = max(least if "force_left" in force.units else min(least, CONTACT_FORCE_N), force.noise)
@@ -471,33 +484,65 @@ def _bump(force: _Force) -> Iterator[str]:
         )
 
 
-def _late(force: _Force) -> Iterator[str]:
-    """Yield that a force stays while the fingers open, or that the gap (m) follows late, by time (s)."""
-    t, gap, span_m = force.t, force.gap, float(np.ptp(force.gap))
-    loaded, free = np.flatnonzero(force.above(LOADED)), np.flatnonzero(~force.above(PART))
-    onset, gone = free[free < loaded[:1].sum()], free[free > loaded[-1:].sum()]
-    if not len(loaded) or not len(onset) or not len(gone):
+def _late(force: _Force, *, doubtful: bool) -> Iterator[str]:
+    """Yield that a force and its gap (m) are not of one time: no object presses more than when the fingers came.
+
+    A late force stays while they are wider than at the contact. A late gap goes on after the contact, and opens after
+    the force is gone. If it is not `doubtful` for another reason: a force grows while they rest, by more than its creep
+    and what they still close explain, or it begins when they rest on something rigid.
+    """
+    t, gap, n = force.t, median_course(force.gap, 1), median_course(force.n, 1) - force.low
+    loaded, free = np.flatnonzero(n > LOADED * force.span), np.flatnonzero(n < PART * force.span)
+    if not len(loaded):
         return
-    begin, end = int(onset[-1]), int(gone[0])
-    least_s = max(LATE_S, 2.0 * float(np.median(np.diff(t))))
-    wide = loaded[(gap[loaded] > gap[begin] + SLIGHT * span_m) & (loaded > loaded[gap[loaded].argmin()])]
-    if len(wide) and t[wide[-1]] - t[wide[0]] > least_s:
-        yield (
-            f"{force.what} stays until {force.when(wide[-1])}, although the fingers are wider than at the contact from "
-            f"{force.when(wide[0])} on: does the force come late, or did its sensor stop?"
-        )
-        return
-    still = 0.5 * SLIGHT * span_m
-    opens = end + int((gap[end:] > gap[begin : end + 1].min() + still).argmax())
-    late_s = float(t[opens] - t[end])
+    begin, pressed, span = int(free[free < loaded[0]].max(initial=0)), int(loaded[0]), float(np.ptp(gap))
+    end = int(free[free > pressed].min(initial=len(t)))
+    narrowest, noise = float(gap[begin:end].min()), NOISE * float(np.median(np.abs(np.diff(force.gap, 2))))
+    travel = float(gap[begin]) - narrowest
+    still = max(SLIGHT * travel, noise, LEAP * (resolution(force.gap) or 0.0))
+    rests = gap <= narrowest + (still if travel > still else noise)
+    came = int(rests[:end].argmax())
+    least_s = max(
+        LATE_S, *(2.0 * period_s(t, values) for values in (t, force.gap, force.n) if np.ptp(values))
+    )
+    stays = np.flatnonzero((gap[came:end] > gap[begin] + SLIGHT * span) & (n[came:end] > LOADED * force.span))
+    if travel > still:
+        explained = n[: came + 1].max() + (CREEP + 2.0 * still / travel) * force.span
+        later, begins_s = np.flatnonzero(rests[came:end] & (n[came:end] > explained)), 0.0
+    else:
+        later = np.flatnonzero(n[came:pressed] < SLIGHT * force.span)
+        begins_s = LOADED * float(t[pressed] - t[begin])
+    opens = end - 1 + int((gap[end - 1 :] > narrowest + 0.5 * SLIGHT * span).argmax())
+    late_s = float(t[opens] - t[end - 1])
     around_s = t[begin] + late_s * np.arange(-1, 2)
     approach, further = -np.diff(np.interp(around_s, t, gap))
-    closes = float(np.interp(t[end] - late_s, t, gap)) - gap[end] > FREE * approach
-    if late_s > least_s and around_s[0] >= t[0] and further > FREE * approach > still and not closes:
+    goes_on = further > FREE * approach > 0.5 * SLIGHT * span and around_s[0] >= t[0]
+    closes = float(np.interp(t[end - 1] - late_s, t, gap)) - gap[end - 1] > FREE * approach
+    if end < len(t) and len(stays) and t[came + stays[-1]] - t[came + stays[0]] > least_s:
+        yield (
+            f"{force.what} stays until {force.when(came + stays[-1])}, although the fingers are wider than at the "
+            f"contact from {force.when(came + stays[0])} on: does the force come late, or did its sensor stop?"
+        )
+    elif late_s > least_s and goes_on and not closes and "gap" not in force.units:
         yield (
             f"the fingers go on as fast after the force begins (at {force.when(begin)}), and open {late_s:.2g} s "
             "after it is gone: does the gap come late?"
         )
+    elif (
+        not doubtful and came and len(later) and t[came + later[-1]] - t[came + later[0]] > least_s + begins_s
+    ):
+        grown = 100.0 * float(n[begin:end].max() - n[came]) / force.span
+        yield (
+            f"{force.what} grows by {grown:.0f} % of its range after {force.when(came)}, while the fingers rest: does "
+            "it come late, was it smoothed, is it the current of a drive with friction, or is something hard in a soft "
+            "layer? If it is late, a contact is too"
+        )
+
+
+def period_s(t_s: Numbers, signal: Numbers) -> float:
+    """Return the usual time (s) between two new values of a signal, infinite if it has none."""
+    new = np.diff(t_s[np.flatnonzero(np.diff(signal))])
+    return float(np.median(new)) if len(new) else np.inf
 
 
 def _gap_leaps(t_s: Numbers, gap: Numbers) -> Iterator[str]:

@@ -91,8 +91,11 @@ def _collected(
             values.setdefault(part, []).append({f"{part}{k}": value for k, value in numbers.items()})
             times.setdefault(part, Messages()).add(recorded_ns, stamped_ns)
     values = {topic: value for topic, value in values.items() if value[0]}
-    wanted = [topic for topic in values if any(name.startswith(f"{topic}.") for name in used)]
-    values = {topic: values[topic] for topic in wanted or values}
+    wanted = {topic for topic in values if any(name.startswith(f"{topic}.") for name in used)}
+    # Of a topic that was divided, and named as a whole, the parts are shown.
+    unknown = topics - {topic.partition(".")[0] for topic in wanted}
+    wanted |= {topic for topic in values if topic.partition(".")[0] in unknown}
+    values = {topic: value for topic, value in values.items() if topic in wanted or not wanted}
     if not values:
         raise DataDamaged(f"{path} has no messages with numbers")
     return values, {topic: times[topic] for topic in values}

@@ -174,8 +174,8 @@ def common_clock(
     silent = [topic for topic, within in inside.items() if _longest(within) > lasting[topic].longest_hold_ns]
     if silent:
         notices += (
-            f"{', '.join(silent)} was silent for more than {PERIODS:g} of its usual periods: a value that then changed "
-            "is missing",
+            f"{', '.join(silent)} was silent, with no values for more than {PERIODS:g} of its usual periods: what then "
+            "changed is not known",
         )
     notices += tuple(_in_bursts(inside))
     return CommonClock(

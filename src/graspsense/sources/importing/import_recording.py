@@ -120,4 +120,4 @@ def _write_readings(file: RecordingWriter, recording: Recording, phases: Sequenc
             if numbers is not None:
                 file.signal(number, wire.pack(*numbers))
         # The commands of the other program are not known.
-        file.tick(frame.t_s, TICK.pack(*frame, phase, 0, math.nan, math.nan, math.nan))
+        file.tick(TICK.pack(*frame, phase, 0, math.nan, math.nan, math.nan))

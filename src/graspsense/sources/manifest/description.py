@@ -194,13 +194,15 @@ def read_manifest(place: Path) -> ReadManifest:
     expressions = {
         name: tuple(parsed(text, name) for text in texts_of(getattr(keys, name))) for name in QUANTITIES
     }
-    channels = {name: parsed(text, "channels", name) for name, text in keys.channels.items()}
-    values = {
-        name: parsed(text, "values", name) for name, text in keys.values.items() if name not in value_files
+    tables = {
+        table: {
+            name: parsed(text, table, name)
+            for name, text in getattr(keys, table).items()
+            if table != "values" or name not in value_files
+        }
+        for table in ("channels", "values", "events", "fingers")
     }
-    events = {name: parsed(text, "events", name) for name, text in keys.events.items()}
-    for name, text in keys.fingers.items():
-        expressions[f"{PREFIX}{name}"] = (parsed(text, "fingers", name),)
+    expressions |= {f"{PREFIX}{name}": (force,) for name, force in tables.pop("fingers").items()}
     wrong = (*_contradictions(keys), *_finger_problems(keys))
     problems += [f"{layer.where(path)}: {why}" for path, why in wrong]
     if problems:
@@ -211,9 +213,7 @@ def read_manifest(place: Path) -> ReadManifest:
         base=place.parent / os.path.expanduser(keys.folder),
         keys=keys,
         expressions=expressions,
-        channels=channels,
-        values=values,
-        events=events,
+        **tables,
         value_files=value_files,
         fast=frozenset(texts_of(keys.fast)),
     )

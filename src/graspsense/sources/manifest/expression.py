@@ -182,6 +182,12 @@ class Expression:
                 f"no column matches {name!r}" if quoted and set("*?") & set(name) else f"no column {name!r}"
             )
             columns = listed([shown if shown.isidentifier() else f"'{shown}'" for shown in known])
+            topic, _, number = name.partition(".")
+            parts = [part for part in known if part.startswith(f"{topic}.") and part.endswith(f".{number}")]
+            if name.startswith("/") and parts:
+                what += (
+                    f": the messages of {topic} are of {len(parts)} kinds in turn. Name one: {listed(parts)}"
+                )
             self._refuse(node, f"{what}. Columns: {columns or 'none'}.{suggestion(name, known)}")
         return names
 

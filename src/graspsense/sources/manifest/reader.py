@@ -23,7 +23,7 @@ from graspsense.recording.replayable import Recording
 from graspsense.sources.columns.grasp_columns import GraspColumns, checked_recording
 from graspsense.sources.formats.raw_tables import raw_tables
 from graspsense.sources.formats.table import ColumnTable, Numbers, TableRules
-from graspsense.sources.formats.topic_clocks import NOTICED, PERIODS
+from graspsense.sources.formats.topic_clocks import Messages, common_clock
 from graspsense.sources.manifest.description import ReadManifest, axes_of, read_manifest, texts_of
 from graspsense.sources.manifest.facts import (
     FIELD,
@@ -38,6 +38,7 @@ from graspsense.sources.manifest.files import NamedFile, files_of, left_out
 from graspsense.sources.manifest.notices import falls_on_closing, notices_of
 from graspsense.sources.manifest.samples import samples
 from graspsense.sources.manifest.steps import cut_at, resampled, squeezes
+from graspsense.sources.units import TO_SI, unit_since_1970
 
 
 def read_recordings(place: str) -> Iterator[LabelledRecording | UnreadableRecording]:
@@ -121,7 +122,8 @@ def _joined(manifest: ReadManifest, tables: list[ColumnTable], path: Path, prefi
     if rows[0] == rows[1] and time is not None:
         warnings = tuple(_other_times(table, other, path, time))
     elif time is not None:
-        table, other = _by_time(table, other, time)
+        unit = next((part.unit for part in manifest.expressions["time"] if part.unit), "")
+        table, other = _by_time(table, other, time, unit or table.units.get(time, ""))
 
     def named(columns: Mapping[str, Any]) -> dict[str, Any]:
         return {f"{prefix}.{name}": column for name, column in columns.items()}
@@ -138,41 +140,34 @@ def _joined(manifest: ReadManifest, tables: list[ColumnTable], path: Path, prefi
     ]
 
 
-def _by_time(table: ColumnTable, other: ColumnTable, time: str) -> tuple[ColumnTable, ColumnTable]:
+def _by_time(table: ColumnTable, other: ColumnTable, time: str, unit: str) -> tuple[ColumnTable, ColumnTable]:
     """Return two tables at the times of the one with more rows, each with its last values. Raises DataDamaged."""
-    times = _times_of(table, other, time)
+    parts, times = (table, other), _times_of(table, other, time)
     if not all(len(at_s) > 1 and (np.diff(at_s) > 0.0).all() for at_s in times):
         raise DataDamaged(
             f"{table.source} and {other.source} are joined by {time}, which has to increase in both"
         )
-    usual = [float(np.median(np.diff(at_s))) for at_s in times]
-    begin = max(at_s[0] for at_s in times)
-    end = min(at_s[-1] + step for at_s, step in zip(times, usual, strict=True))
-    most = times[0] if len(times[0]) >= len(times[1]) else times[1]
-    rows = most[(most >= begin) & (most <= end)]
-    if not len(rows):
-        raise DataDamaged(f"{table.source} and {other.source} have no {time} in common: check their clocks")
-    last = [np.searchsorted(at_s, rows, side="right") - 1 for at_s in times]
-    old = [(rows - at_s[k]).max() > PERIODS * step for at_s, k, step in zip(times, last, usual, strict=True)]
-    told = [
-        f"{part.source} has no values for more than {PERIODS:g} of its usual periods: the last one is used"
-        for part, is_old in zip((table, other), old, strict=True)
-        if is_old
-    ]
-    lost = 1.0 - len(rows) / len(most)
-    if lost > NOTICED:
-        told.append(
-            f"{100 * lost:.0f} % of the rows are left out: {other.source} begins later or ends earlier"
-        )
-    joined = table.rows(last[0])
+    # As the messages of two topics without headers.
+    ns = 1e9 * TO_SI["time"].get(unit or unit_since_1970(float(times[0][0])), 1.0)
+    began = min(at_s[0] for at_s in times)
+    came = [list(map(round, ((at_s - began) * ns).tolist())) for at_s in times]
+    topics = {
+        part.source: Messages(recorded_ns=recorded_ns, stamped_ns=[0] * len(recorded_ns))
+        for part, recorded_ns in zip(parts, came, strict=True)
+    }
+    clock = common_clock(time, topics)
+    most = max(parts, key=len)
+    rows_ns = clock.topics[most.source].between(clock.begin_ns, clock.end_ns)
+    last = {part.source: clock.topics[part.source].latest(rows_ns)[0] for part in parts}
+    joined = table.rows(last[table.source])
     return (
         evolve(
             joined,
-            numbers={**joined.numbers, time: rows},
+            numbers={**joined.numbers, time: times[parts.index(most)][last[most.source]]},
             notes=(*table.notes, f"{other.source} is joined by {time}: the last value of each file is used"),
-            warnings=(*table.warnings, *told),
+            warnings=(*table.warnings, *clock.notices),
         ),
-        other.rows(last[1]),
+        other.rows(last[other.source]),
     )
 
 

@@ -16,7 +16,7 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 from graspsense.sources.columns.channel_facts import resolution, usual_range
-from graspsense.sources.columns.recording_notices import PART
+from graspsense.sources.columns.recording_notices import PART, period_s
 from graspsense.sources.formats.table import Numbers
 from graspsense.sources.manifest.steps import NOISE
 
@@ -82,7 +82,7 @@ def apart(t_s: Numbers, gap: Numbers, force: Numbers) -> Iterator[str]:
     """Yield that one of gap and force turns where the other does not, by the times of a recording (s)."""
     if not (np.isfinite(t_s[[0, -1]]).all() and np.diff(t_s).min() > 0.0):
         return
-    step_s = max(_period_s(t_s, signal) for signal in (t_s, gap, force))
+    step_s = max(period_s(t_s, signal) for signal in (t_s, gap, force))
     n = max(2, round(TURN_S / step_s))
     rows = (t_s[-1] - t_s[0]) / step_s
     if FAR * n * step_s > LONGEST_S or not 2 * FAR * n < rows < (1.0 + HOLES) * len(t_s):
@@ -116,9 +116,3 @@ def apart(t_s: Numbers, gap: Numbers, force: Numbers) -> Iterator[str]:
             "change their speed slowly: was the gap smoothed, or is it of another time than the force? A rest is then "
             "seen too late"
         )
-
-
-def _period_s(t_s: Numbers, signal: Numbers) -> float:
-    """Return the usual time (s) between two new values of a signal, infinite if it has none."""
-    new = np.diff(t_s[np.flatnonzero(np.diff(signal))])
-    return float(np.median(new)) if len(new) else np.inf

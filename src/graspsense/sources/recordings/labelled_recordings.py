@@ -41,14 +41,11 @@ def labelled_recordings(
     facts: list[LabelledRecording] = []
     rows: list[tuple[Features, Features]] = []
     read = list(readable_or_not(kind, place))
-    unreadable: list[UnreadableRecording] = []
+    unreadable = [recording for recording in read if isinstance(recording, UnreadableRecording)]
     known = [recording for recording in read if isinstance(recording, LabelledRecording)]
     fitted, threshold_notes = _fitted(features, [recording.recording for recording in known])
     features = with_checkpoints(fitted, checkpoints_s)
-    for recording in read:
-        if isinstance(recording, UnreadableRecording):
-            unreadable.append(recording)
-            continue
+    for recording in known:
         extract = partial(_features_of, recording, features)
         for extracted in each_readable(recording.source, extract) if recording.label else ():
             if isinstance(extracted, UnreadableRecording):

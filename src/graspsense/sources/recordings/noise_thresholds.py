@@ -395,11 +395,9 @@ def _timeouts(
     """Return the time-outs that are shorter than a recording, extended to the longest one, and why."""
     longest = max(float(np.ptp(recording.frames[[0, -1], 0])) for recording in recordings)
     limit = min(_rounded(longest), _MOST_TIMEOUT_S) if scale.t == "s" else _rounded(longest)
-    chosen = {f"controller.{key}": limit for key, value in timeouts_s.items() if value < longest}
-    if not chosen:
-        return {}, ""
-    keys = " and ".join(key for key, value in timeouts_s.items() if value < longest)
-    return chosen, f"{keys} {limit:g} {scale.t} (recordings last up to {longest:.3g} {scale.t})"
+    short = [key for key, value in timeouts_s.items() if value < longest]
+    words = f"{' and '.join(short)} {limit:g} {scale.t} (recordings last up to {longest:.3g} {scale.t})"
+    return {f"controller.{key}": limit for key in short}, words if short else ""
 
 
 def _baseline(force: Numbers) -> float:
