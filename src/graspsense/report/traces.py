@@ -128,7 +128,8 @@ def _phases(picture: Picture, grasp: GraspCurve, t: Sequence[float], x_scale: Ax
                 continue
             end = t[min(k, len(t) - 1)]
             colour = PHASES.get(phases[start], OTHER_PHASE)
-            picture.band(x_scale(t[start]), x_scale(end), FORCE[1], GAP[0], colour)
+            left = x_scale(t[start])
+            picture.box(left, FORCE[1], x_scale(end) - left, GAP[0] - FORCE[1], colour)
             durations.append(f"{phases[start]} for {end - t[start]:.2f}")
             start = k
     for k, phase in enumerate(dict.fromkeys(phases)):
