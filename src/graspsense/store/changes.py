@@ -216,10 +216,8 @@ def inconsistencies(store: Store) -> dict[int, str]:
         elif change.action != "value":
             aside[change.trial] = change.action == "aside"
     problems = {}
-    rows = store.query(
-        "SELECT id, label, instance, set_aside, labels FROM trial JOIN detail ON detail.trial = trial.id ORDER BY id"
-    )
-    for number, label, instance, why, recorded in rows:
+    columns = store.columns(("id", "label", "instance", "set_aside", "labels"), "TRUE")
+    for number, label, instance, why, recorded in zip(*columns.values(), strict=True):
         try:
             grasped = json.loads(recorded)
             expected = labels.get(number, word_of(grasped.get("label"), grasped.get("instance")))

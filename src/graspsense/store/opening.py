@@ -199,7 +199,9 @@ def store_folder(text: str | os.PathLike[str]) -> str:
     if name.startswith(STORE) and not os.path.exists(name):
         name = os.path.expanduser(name.removeprefix(STORE))
     if not name:
-        raise ConfigError("an empty text names no folder: name the one of a store, or . for the current folder")
+        raise ConfigError(
+            "an empty text names no folder: name the one of a store, or . for the current folder"
+        )
     path = Path(name)
     return str(path.parent) if path.name == FILE and path.is_file() else name
 

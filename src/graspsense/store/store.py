@@ -238,6 +238,20 @@ class Store:
         rows = self.query(f"{query} ORDER BY id DESC LIMIT ?", (*values, limit))
         return [TrialSummary.from_row(row) for row in rows]
 
+    def columns(
+        self, names: Sequence[str], where: str, values: Sequence[object] = ()
+    ) -> dict[str, tuple[Any, ...]]:
+        """Return these columns of the trials that an SQL condition selects, oldest first; `device` is its name."""
+        selected = ", ".join(
+            f'{"detail" if name in DETAIL_COLUMNS and name != "device" else "trial"}."{name}"'
+            for name in names
+        )
+        query = (
+            f"SELECT {selected} FROM trial JOIN detail ON detail.trial = trial.id WHERE {where} ORDER BY id"
+        )
+        rows = self.query(query, values)
+        return dict(zip(names, zip(*rows, strict=True) if rows else [()] * len(names), strict=True))
+
     def recording_names(self) -> set[str]:
         """Return the names of all recordings that have a row."""
         return {name for (name,) in self.query("SELECT recording FROM trial")}
