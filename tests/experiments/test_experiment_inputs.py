@@ -11,6 +11,7 @@ from attrs import evolve
 from cases import every_case
 from kept import keep
 
+from graspsense.core.components.caller import command_line
 from graspsense.core.components.registry import IsolatedPlugins, installed
 from graspsense.core.values.errors import ConfigError
 from graspsense.experiments.answer import answer
@@ -22,6 +23,7 @@ from graspsense.experiments.page import write_page
 from graspsense.experiments.results import Results
 from graspsense.experiments.run import run_experiment
 from graspsense.experiments.summary import summarise
+from graspsense.experiments.task import TaskResult, run_task
 from graspsense.plugin_api import hookimpl
 from graspsense.sources import input_content
 from graspsense.sources.input_content import contents_of
@@ -99,6 +101,16 @@ def test_results_keep_their_task_where_data_move_and_are_shown_where_data_are_no
     monkeypatch.chdir(there)
     options = read_experiment("e.toml", ["data.source=u.csv"])
     assert options.cases[0].data.source == str(there / "u.csv")
+
+
+def test_a_result_says_the_same_whatever_runs_its_task(tmp_path):
+    table(tmp_path / "t.csv", 1, 3.0)
+    (task,) = read_experiment(experiment(tmp_path, "t.csv", more="", label='label = "what"')).tasks()
+    task = evolve(task, params={**task.params, "judge": {**task.params["judge"], "controls": True}})
+    alone = TaskResult.from_text(run_task(task.to_text())).result
+    with command_line():
+        assert TaskResult.from_text(run_task(task.to_text())).result == alone
+    assert "instance=COLUMN" in str(alone)
 
 
 def test_two_tables_that_are_exchanged_are_another_task(tmp_path):
