@@ -207,9 +207,15 @@ def test_a_store_that_grew_or_was_corrected_is_another_input(tmp_path):
         assert rate_of(read_experiment(file), results)[1] == 23
 
         names = [f"store:{tmp_path}/s", f"store:{tmp_path}/s#3"]  # the store, and one of its trials
-        known = contents_of(names)
-        next(store.recordings.glob("*.mcap")).unlink()
-        assert all(contents_of(names)[name] != known[name] for name in names)
+        recording = next(store.recordings.glob("*.mcap"))
+        for change in (
+            lambda: recording.write_bytes(recording.read_bytes()[:-9]),
+            recording.unlink,
+            lambda: store._connection.execute("DELETE FROM detail WHERE trial = 5"),
+        ):
+            known = contents_of(names)
+            change()
+            assert all(contents_of(names)[name] != known[name] for name in names)
 
 
 def assert_counts(path, params):

@@ -113,8 +113,7 @@ def _curve(trace: Trace) -> str:
     picture = Picture(314.0)
     right = picture.width - 10.0
     x = AxisScale(float(t[0]), float(t[-1]), 36.0, right) if len(t) else AxisScale(0.0, 1.0, 36.0, right)
-    for phase, begin, end in phase_spans(t, trace.phase[start:]):
-        name = phase.name.lower()
+    for name, begin, end in phase_spans(t, trace.phase[start:]):
         left, width = x(begin), x(end) - x(begin)
         picture.box(left, 30.0, width, 250.0, PHASES.get(name, OTHER_PHASE))
         if width > 7.0 * len(name):
