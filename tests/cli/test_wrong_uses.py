@@ -155,14 +155,19 @@ def test_a_store_may_be_named_in_every_way(store):
     store = store.rename(f"{store}#2")
     for number in ("", "#3"):
         assert as_source(f"{store}{number}") == f"store:{store}{number}"
+    for named in ("", "store:"):  # as of a variable of a shell that is not set
+        with pytest.raises(ConfigError, match="names no folder"):
+            store_folder(named)
+    assert store_folder("~nobody-of-this-name/trials") == "~nobody-of-this-name/trials"
 
 
-def test_folds_are_refused_before_the_first_grasp(run, monkeypatch):
+def test_folds_and_a_class_are_refused_before_the_first_grasp(run, monkeypatch):
     monkeypatch.setattr("graspsense.sources.trial_source.simulated", lambda *_, **__: pytest.fail("grasped"))
     few = ("simulated", "--objects", "can:full_open,can:empty_open", "--instances", "1", "--trials", "1")
     for command in (("evaluate", *few), ("compare", *few)):
         assert "into 40 folds" in refused(*command, "--folds", "40")
         refused(*command, "--folds", "1")
+        assert "Known: can." in refused(*command, "--folds", "2", "--only", "nope")
 
 
 def test_options_in_python_are_a_list():

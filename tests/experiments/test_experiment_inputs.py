@@ -11,6 +11,7 @@ from attrs import evolve
 from cases import every_case
 from kept import keep
 
+from graspsense.core.components.caller import command_line
 from graspsense.core.components.registry import IsolatedPlugins, installed
 from graspsense.core.values.errors import ConfigError
 from graspsense.experiments.answer import answer
@@ -22,6 +23,7 @@ from graspsense.experiments.page import write_page
 from graspsense.experiments.results import Results
 from graspsense.experiments.run import run_experiment
 from graspsense.experiments.summary import summarise
+from graspsense.experiments.task import TaskResult, run_task
 from graspsense.plugin_api import hookimpl
 from graspsense.sources import input_content
 from graspsense.sources.input_content import contents_of
@@ -99,6 +101,16 @@ def test_results_keep_their_task_where_data_move_and_are_shown_where_data_are_no
     monkeypatch.chdir(there)
     options = read_experiment("e.toml", ["data.source=u.csv"])
     assert options.cases[0].data.source == str(there / "u.csv")
+
+
+def test_a_result_says_the_same_whatever_runs_its_task(tmp_path):
+    table(tmp_path / "t.csv", 1, 3.0)
+    (task,) = read_experiment(experiment(tmp_path, "t.csv", more="", label='label = "what"')).tasks()
+    task = evolve(task, params={**task.params, "judge": {**task.params["judge"], "controls": True}})
+    alone = TaskResult.from_text(run_task(task.to_text())).result
+    with command_line():
+        assert TaskResult.from_text(run_task(task.to_text())).result == alone
+    assert "instance=COLUMN" in str(alone)
 
 
 def test_two_tables_that_are_exchanged_are_another_task(tmp_path):
@@ -195,9 +207,15 @@ def test_a_store_that_grew_or_was_corrected_is_another_input(tmp_path):
         assert rate_of(read_experiment(file), results)[1] == 23
 
         names = [f"store:{tmp_path}/s", f"store:{tmp_path}/s#3"]  # the store, and one of its trials
-        known = contents_of(names)
-        next(store.recordings.glob("*.mcap")).unlink()
-        assert all(contents_of(names)[name] != known[name] for name in names)
+        recording = next(store.recordings.glob("*.mcap"))
+        for change in (
+            lambda: recording.write_bytes(recording.read_bytes()[:-9]),
+            recording.unlink,
+            lambda: store._connection.execute("DELETE FROM detail WHERE trial = 5"),
+        ):
+            known = contents_of(names)
+            change()
+            assert all(contents_of(names)[name] != known[name] for name in names)
 
 
 def assert_counts(path, params):

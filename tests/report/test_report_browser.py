@@ -81,7 +81,7 @@ def long_page():
         numbers=3,
         verdicts=(2,),
     )
-    over = rates_over({"c45": list(enumerate(rates))}, "x", "c")
+    over = rates_over({"c45": list(enumerate(rates)), "knn": list(enumerate(rates))}, "x", "c", 0.8)
     predicted = LABELS + LABELS[::-1] + LABELS[1:] + LABELS[:1]
     matrix = confusion_table(confusion(LABELS * 3, predicted), "M.")
     made = facts([("hash of " + "x" * 80, "f" * 128)]) + bullets(["/".join(LABELS)])
@@ -232,6 +232,19 @@ def test_values_are_read_out_under_the_pointer(browser, pages):
     assert browser.run(TIP) == ["case 0: 80.0 % (78.0 to 93.0)"]
     browser.mouse("mouseMoved", 1, 1)
     assert browser.run(TIP) == []
+    # So is every series of a picture, and what is drawn across it moves with the axis.
+    mark = mark.replace(".find(", ".filter(") + ".at(-1)"
+    browser.run(mark + ".scrollIntoView({block: 'center'})")
+    left, top, width, height = browser.run(f"{BOX}({mark})")
+    browser.mouse("mouseMoved", left + width / 2, top + height / 2)
+    assert browser.run(TIP)[0].startswith("case 9: ")
+    dashed = "one.getAttribute('stroke-dasharray') === '3 3'"
+    guess = (
+        f"[...document.querySelectorAll('#rates polyline')].find((one) => {dashed}).getAttribute('points')"
+    )
+    drawn = browser.run(guess)
+    browser.drag((left - 60, top - 30), (left, top + 30))
+    assert browser.run(guess) != drawn
 
 
 def axis(browser):

@@ -215,10 +215,12 @@ def test_a_store_of_the_first_version_keeps_what_was_set_aside_in_it(store):
         connection.executescript(
             "DROP TABLE change; UPDATE trial SET set_aside = 'undone' WHERE id = 1; PRAGMA user_version = 1"
         )
+    content = (store.folder / "store.sqlite").read_bytes()
     with Store.read(store.folder) as old:
         (change,) = changes.history(old)
         assert (change.trial, change.words, change.why) == (1, "set aside", "undone")
         assert [summary.id for summary in old.page()] == [2]
+        assert (store.folder / "store.sqlite").read_bytes() == content  # it may be on a read-only disk
         changes.set_aside(store := Store.open(old.folder), [2], "x")
         store.close()
     assert verify_store(store.folder).problems == ()
@@ -281,6 +283,10 @@ def test_a_number_that_cannot_be_changed_is_refused(store):
         assert code == 2
         assert re.search(says, " ".join(err.split()))
         assert changes.history(store) == []
+    store._connection.execute("DELETE FROM detail WHERE trial = 2")
+    with pytest.raises(DataDamaged, match="trial 2"):
+        changes.set_number(store, [1, 2], "fill [ml]", "210", "")
+    assert changes.history(store) == []
     # Nor are trials collected with a number in another unit.
     collect = ("collect", "--save", store.folder, "--labels", "can:full_open", "--value", "fill=3")
     assert "ml, and 'fill'" in " ".join(refused(*collect).split())

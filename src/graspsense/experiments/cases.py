@@ -14,7 +14,7 @@ from graspsense.core.components.setting import worded
 from graspsense.core.components.strict import InvalidValue, ValidationFailed, plain, structured
 from graspsense.core.files.toml_text import KeyPath
 from graspsense.core.learn.copies import without_copies
-from graspsense.core.settings.layers import Layer, Merged, dotted
+from graspsense.core.settings.layers import Flag, Layer, Merged, dotted
 from graspsense.core.settings.resolved import Settings, resolve
 from graspsense.core.settings.selected import build
 from graspsense.core.values.errors import ConfigError, GraspsenseError, counted, suggestion
@@ -171,9 +171,9 @@ class CasePlan:
         merged = Merged()
         merged.add((), _tables(experiment), self.layer)
         merged.add((), _tables(variant), self.layer)
-        values = merged.values
         for path, value in point:
-            _put(values, path, value)
+            merged.add((), Flag("sweep", ".".join(path), value).layer().values, self.layer)
+        values = merged.values
         data = self._keys(values.get("data", {}), TrialSource, "data")
         test = self._keys(values["test"], TrialSource, "test") if values.get("test") else None
         over = {table: values[table] for table in PIPELINE_TABLES if values.get(table)}
@@ -282,12 +282,12 @@ class CasePlan:
             table = {"type": spec} if isinstance(spec, str) else dict(spec)
             called = str(table.pop("name", table.get("type", "")).rpartition("/")[2])
             for point in _points(sweep, "classifier", within=True):
-                keys = {**table, **variant}
+                merged = Merged({**table, **variant})
                 for path, value in point:
-                    _put(keys, path[1:], value)
+                    merged.add((), Flag("sweep", ".".join(path[1:]), value).layer().values, self.layer)
                 try:
-                    component = installed().find("classifier", str(keys.pop("type")))
-                    config = _fresh(build(component, keys, force=self.force))
+                    component = installed().find("classifier", str(merged.values.pop("type")))
+                    config = _fresh(build(component, merged.values, force=self.force))
                 except (KeyError, GraspsenseError) as error:
                     missing = isinstance(error, KeyError)
                     self._complain(
@@ -364,11 +364,3 @@ def _points(
     """Return every combination of the swept keys of this table, or, if not `within`, of all other tables."""
     chosen = {path: values for path, values in sweep.items() if (path[0] == table) is within}
     return [tuple(zip(chosen, values, strict=True)) for values in itertools.product(*chosen.values())]
-
-
-def _put(values: dict[str, Any], path: Sequence[str], value: Any) -> None:
-    for part in path[:-1]:
-        inner = values.get(part)
-        values[part] = dict(inner) if isinstance(inner, Mapping) else {}
-        values = values[part]
-    values[path[-1]] = value

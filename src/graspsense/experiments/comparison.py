@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -153,7 +154,7 @@ def compare_experiments(paths: Sequence[str]) -> ExperimentComparison:
 
 def _folder(path: str) -> Path:
     """Return the folder of an experiment."""
-    given = Path(path).expanduser()
+    given = Path(os.path.expanduser(path))
     folder = given.parent if given.is_file() else given
     if not given.exists():
         raise ConfigError(f"there is no {path}: name folders that `graspsense experiment` wrote")

@@ -45,22 +45,32 @@ class PipelineOf:
 
 
 @frozen(kw_only=True)
-class Variant:
-    """A case that differs from the others in several keys at once."""
+class CaseTables:
+    """The tables of the file of an experiment that say what its cases are."""
 
-    name: str
     gripper: Mapping[str, Any] = field(factory=dict)
+    """Keys that override those of all pipelines. Likewise `controller`, `features` and `run`."""
     controller: Mapping[str, Any] = field(factory=dict)
     features: Mapping[str, Any] = field(factory=dict)
     run: Mapping[str, Any] = field(factory=dict)
-    classifier: Mapping[str, Any] = field(factory=dict)
     data: Mapping[str, Any] = field(factory=dict)
+    """Keys of `graspsense.sources.trial_source.TrialSource`."""
     test: Mapping[str, Any] = field(factory=dict)
+    """Other trials to test on, instead of cross-validation."""
     judge: Mapping[str, Any] = field(factory=dict)
+    """Keys that the kind of the experiment defines, such as `graspsense.experiments.recognise.EvaluationSettings`."""
 
 
 @frozen(kw_only=True)
-class Experiment:
+class Variant(CaseTables):
+    """A case that differs from the others in several keys at once."""
+
+    name: str
+    classifier: Mapping[str, Any] = field(factory=dict)
+
+
+@frozen(kw_only=True)
+class Experiment(CaseTables):
     """The keys of an experiment file."""
 
     title: str
@@ -71,22 +81,11 @@ class Experiment:
     seeds: int | tuple[int, ...] = field(default=1, validator=_seeds)
     """Number of seeds, or a list of them. Each seed has its own simulated trials and its own folds."""
     pipelines: tuple[str | PipelineOf, ...] = ("default",)
-    gripper: Mapping[str, Any] = field(factory=dict)
-    """Keys that override those of all pipelines. Likewise `controller`, `features` and `run`."""
-    controller: Mapping[str, Any] = field(factory=dict)
-    features: Mapping[str, Any] = field(factory=dict)
-    run: Mapping[str, Any] = field(factory=dict)
     classifiers: tuple[str | Mapping[str, Any], ...] = ()
     """Names, or tables with a `type`, a `name` to show, and keys. Default: that of the pipeline, or c45."""
     variants: tuple[Variant, ...] = ()
     sweep: Mapping[str, Any] = field(factory=dict)
     """Keys such as `controller.probing_force_n`, each with a list of values; every combination is a case."""
-    data: Mapping[str, Any] = field(factory=dict)
-    """Keys of `graspsense.sources.trial_source.TrialSource`."""
-    test: Mapping[str, Any] = field(factory=dict)
-    """Other trials to test on, instead of cross-validation."""
-    judge: Mapping[str, Any] = field(factory=dict)
-    """Keys that the kind of the experiment defines, such as `graspsense.experiments.recognise.EvaluationSettings`."""
 
     @property
     def listed_seeds(self) -> tuple[int, ...]:

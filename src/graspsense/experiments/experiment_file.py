@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -50,7 +51,7 @@ def read_experiment(
     ranges. Raises ConfigError that lists all errors with their files and lines.
     """
     layer, base, name = _found(asked)
-    identity = asked if base is None else str(Path(asked).expanduser().resolve())
+    identity = asked if base is None else str(Path(os.path.expanduser(asked)).resolve())
     if identity in within:
         chain = " > ".join(Path(path).name for path in (*within, identity))
         raise ConfigError(f"{layer.label}: an experiment cannot be a part of itself: {chain}")
@@ -137,7 +138,7 @@ def _of_parts(
 def _found(asked: str) -> tuple[Layer, Path | None, str]:
     """Return the content of the file of an experiment, the folder that its paths are relative to, and its name."""
     if asked.endswith(".toml"):
-        path = Path(asked).expanduser()
+        path = Path(os.path.expanduser(asked))
         return read_toml(path, asked, "experiment"), path.parent, in_one_line(path.stem)
     try:
         resource = installed().resource(ExperimentEntry, asked)

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from attrs import asdict, field, frozen
 
+from graspsense.core.components.caller import command_line
 from graspsense.core.learn.model_content import digest
 from graspsense.core.values.errors import FAILURES, ConfigError, GraspsenseError, listed, named, place_of
 from graspsense.core.values.json_values import json_text
@@ -118,8 +119,8 @@ def run_task(text: str) -> str:
     result: Mapping[str, Any] | None = None
     reason = where = ""
     try:
-        # Plugins may print; standard output carries results only.
-        with redirect_stdout(sys.stderr):
+        # Plugins may print; standard output carries results only. Their words are the same in every process.
+        with redirect_stdout(sys.stderr), command_line(taken=False):
             kind = kind_of(task.kind)
             # Encoded here, so that a value of a plugin that JSON cannot hold fails this task alone, and at once.
             result = kind.encoded(kind.function()(task.params, task.seed))

@@ -30,14 +30,14 @@ def shown_from(trace: Trace) -> int:
     return int(np.searchsorted(trace.t_s, contact - BEFORE_CONTACT_S))
 
 
-def phase_spans(t: Floats, phases: Integers) -> list[tuple[Phase, float, float]]:
-    """Return each phase in turn with the times at which it begins and ends."""
+def phase_spans(t: Floats, phases: Integers) -> list[tuple[str, float, float]]:
+    """Return the name of each phase in turn, with the times at which it begins and ends."""
     if len(t) == 0:
         return []
     starts = [0, *(np.flatnonzero(np.diff(phases)) + 1).tolist()]
     ends = [*starts[1:], len(t) - 1]
     return [
-        (Phase(int(phases[start])), float(t[start]), float(t[end]))
+        (Phase(int(phases[start])).name.lower(), float(t[start]), float(t[end]))
         for start, end in zip(starts, ends, strict=True)
     ]
 

@@ -113,11 +113,11 @@ def _curve(trace: Trace) -> str:
     picture = Picture(314.0)
     right = picture.width - 10.0
     x = AxisScale(float(t[0]), float(t[-1]), 36.0, right) if len(t) else AxisScale(0.0, 1.0, 36.0, right)
-    for phase, begin, end in phase_spans(t, trace.phase[start:]):
-        name = phase.name.lower()
-        picture.band(x(begin), x(end), 30.0, 280.0, PHASES.get(name, OTHER_PHASE))
-        if x(end) - x(begin) > 7.0 * len(name):
-            picture.text((x(begin) + x(end)) / 2.0, 166.0, name, anchor="middle")
+    for name, begin, end in phase_spans(t, trace.phase[start:]):
+        left, width = x(begin), x(end) - x(begin)
+        picture.box(left, 30.0, width, 250.0, PHASES.get(name, OTHER_PHASE))
+        if width > 7.0 * len(name):
+            picture.text(left + width / 2.0, 166.0, name, anchor="middle")
     pads = {"left pad": trace.force_left_n[start:], "right pad": trace.force_right_n[start:]}
     forces = [*pads["left pad"].tolist(), *pads["right pad"].tolist(), 1.0]
     gaps = factor * trace.gap_m[start:]

@@ -153,7 +153,9 @@ class Plot {
 for (const svg of document.querySelectorAll("figure svg")) {
   const plots = [...svg.querySelectorAll("g.plot")].map((group) => new Plot(group));
   if (!plots.length) continue;
-  const axes = [...svg.querySelectorAll("g.axis")].map((group) => ({group, scale: numbers(group.dataset.scale), first: numbers(group.dataset.scale)}));
+  // An axis without length has a picture beside it, which does not move.
+  const axes = [...svg.querySelectorAll("g.axis")].map((group) => ({group, scale: numbers(group.dataset.scale), first: numbers(group.dataset.scale)}))
+    .filter(({group}) => new Set(numbers(group.dataset.span)).size > 1);
   const figure = svg.closest("figure"), tip = made("div", "tip"), reset = made("button", "reset", "whole picture");
   const cursor = svgElement("g", {fill: "none", stroke: "var(--quiet)"});
   reset.type = "button";

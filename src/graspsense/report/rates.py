@@ -111,6 +111,7 @@ def rates_over(
     `guess` is the rate of guessing.
     """
     legends = [lines_within(name, WIDTH - 80) for name in series]
+    drawn = {name: sorted(points, key=lambda point: point[0]) for name, points in series.items()}
     below = 262.0 + LINE * (len(lines_within(axis, WIDTH)) - 1)
     picture = Picture(below + LEGEND * len(series) + LINE * sum(len(lines) - 1 for lines in legends))
     xs = [x for points in series.values() for x, _ in points]
@@ -119,36 +120,34 @@ def rates_over(
     picture.y_axis(y_scale, 36, picture.width - 8, rate_axis_title(y_scale))
     draw_breaks(picture, y_scale, 36, 0.0, upright=True)
     picture.x_axis(x_scale, 24, 215, axis)
-    if guess is not None and y_scale.low <= 100 * guess <= y_scale.high:
-        y = y_scale(100 * guess)
-        picture.line([(36, y), (picture.width - 8, y)], QUIET, dash="3 3")
-        caption += f" The dashed line is always guessing the most frequent label, {100 * guess:.0f} %."
-    elif guess is not None:
-        where = "below" if 100 * guess < y_scale.low else "above"
-        caption += f" Always guessing the most frequent label, {100 * guess:.0f} %, is {where} the axis."
-    told, y = [], below
-    for k, (name, points) in enumerate(series.items()):
-        ink, dash = INKS[k % len(INKS)], DASHES[k % len(DASHES)]
-        drawn = sorted(points, key=lambda point: point[0])
-        # Each series is shifted, so that intervals at the same x do not hide each other.
-        shift = 5.0 * (k - (len(series) - 1) / 2)
-        places = [(x_scale(x) + shift, y_scale(100 * row.rate)) for x, row in drawn]
-        with picture.plot(x_scale, y_scale, 24, 215):
-            joined = [place for place, (_, row) in zip(places, drawn, strict=True) if row.joined]
-            picture.line(joined, ink, width=2, dash=dash)
-            for (x, place), (_, row) in zip(places, drawn, strict=True):
+    with picture.plot(x_scale, y_scale, 24, 215):
+        if guess is not None and y_scale.low <= 100 * guess <= y_scale.high:
+            ends = (x_scale.start, x_scale.end)
+            picture.line([(x, y_scale(100 * guess)) for x in ends], QUIET, dash="3 3")
+            caption += f" The dashed line is always guessing the most frequent label, {100 * guess:.0f} %."
+        elif guess is not None:
+            where = "below" if 100 * guess < y_scale.low else "above"
+            caption += f" Always guessing the most frequent label, {100 * guess:.0f} %, is {where} the axis."
+        for k, points in enumerate(drawn.values()):
+            ink, dash = INKS[k % len(INKS)], DASHES[k % len(DASHES)]
+            # Each series is shifted, so that intervals at the same x do not hide each other.
+            shift = 5.0 * (k - (len(series) - 1) / 2)
+            places = [(x_scale(x) + shift, y_scale(100 * row.rate), row) for x, row in points]
+            picture.line([(x, y) for x, y, row in places if row.joined], ink, width=2, dash=dash)
+            for x, y, row in places:
                 if row.interval is not None:
-                    low, high = (y_scale(100 * end) for end in row.interval)
-                    picture.line([(x, low), (x, high)], ink, width=2)
-                size = 4.0 if row.joined else 1.8
-                picture.mark(x, place, ink, k, size, f"{row.name}: {row.words}")
+                    picture.line([(x, y_scale(100 * end)) for end in row.interval], ink, width=2)
+                picture.mark(x, y, ink, k, 4.0 if row.joined else 1.8, f"{row.name}: {row.words}")
+    told, y = [], below
+    for k, (name, points) in enumerate(drawn.items()):
+        ink, dash = INKS[k % len(INKS)], DASHES[k % len(DASHES)]
         picture.line([(40, y - 4), (66, y - 4)], ink, width=2, dash=dash)
         picture.mark(53, y - 4, ink, k)
         for line in legends[k]:
             picture.text(72, y, line)
             y += LINE
         y += LEGEND - LINE
-        told.append(f"{name}: " + ", ".join(f"{number(x)}: {row.words}" for x, row in drawn))
+        told.append(f"{name}: " + ", ".join(f"{number(x)}: {row.words}" for x, row in points))
     return figure(
         picture.svg(f"Recognition rate against {axis}, with 95 % intervals. {'; '.join(told)}"), caption
     )

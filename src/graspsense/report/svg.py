@@ -121,18 +121,11 @@ class Picture:
             f'<polyline points="{path}" fill="none" stroke="{ink}" stroke-width="{width:g}"{dashes}{named}{more}/>'
         )
 
-    def band(self, left: float, right: float, top: float, bottom: float, fill: str) -> None:
-        """Draw a coloured background."""
-        corners = ((left, top), (right, top), (right, bottom), (left, bottom))
-        path = " ".join(f"{x:.1f},{y:.1f}" for x, y in corners)
-        self.parts.append(f'<polygon points="{path}" fill="{fill}"/>')
-
     def box(self, x: float, y: float, width: float, height: float, fill: str, edge: str = "none") -> None:
-        """Draw a rectangle."""
-        self.parts.append(
-            f'<rect x="{x:.1f}" y="{y:.1f}" width="{max(width, 0):.1f}" height="{max(height, 0):.1f}" '
-            f'fill="{fill}" stroke="{edge}"/>'
-        )
+        """Draw a rectangle, by its corners: a page moves them when a plot is zoomed."""
+        corners = ((x, y), (x + width, y), (x + width, y + height), (x, y + height))
+        path = " ".join(f"{x:.1f},{y:.1f}" for x, y in corners)
+        self.parts.append(f'<polygon points="{path}" fill="{fill}" stroke="{edge}"/>')
 
     def mark(self, x: float, y: float, ink: str, shape: int = 0, size: float = 4.0, words: str = "") -> None:
         """Draw a mark, one of four shapes; `words` are shown under the pointer."""

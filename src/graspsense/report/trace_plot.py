@@ -8,7 +8,6 @@ from typing import Any, Final
 import numpy as np
 
 from graspsense.core.values.fingers import FingerForce
-from graspsense.core.values.signals import Phase
 from graspsense.core.values.trace import Floats, ImageTrace, Integers, SampleTrace, Trace
 from graspsense.core.values.units import display_unit, without_underscores
 from graspsense.report.moments import (
@@ -22,7 +21,7 @@ from graspsense.report.moments import (
 )
 from graspsense.report.write import require_matplotlib, show_literally
 
-PHASE_COLOURS: Final = {Phase.APPROACH: "#e9eff6", Phase.SQUEEZE: "#fbdcb4", Phase.HOLD: "#c9e6cf"}
+PHASE_COLOURS: Final = {"approach": "#e9eff6", "squeeze": "#fbdcb4", "hold": "#c9e6cf"}
 OTHER_PHASE: Final = "#f3f3f3"
 LEAST_NAMED: Final = 0.05
 """A phase that lasts less than this share of the grasp is shaded but not named."""
@@ -129,7 +128,5 @@ def _name_phases(axes: Any, t: Floats, phases: Integers) -> None:
     least = LEAST_NAMED * float(t[-1] - t[0])
     named = [span for span in phase_spans(t, phases) if span[2] - span[1] >= least]
     above = axes.secondary_xaxis("top")
-    above.set_xticks(
-        [0.5 * (begin + end) for _, begin, end in named], [span[0].name.lower() for span in named]
-    )
+    above.set_xticks([0.5 * (begin + end) for _, begin, end in named], [span[0] for span in named])
     above.tick_params(length=0, pad=2, labelsize=8)

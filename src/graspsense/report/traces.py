@@ -11,9 +11,11 @@ import numpy as np
 from graspsense.core.components.registry import installed
 from graspsense.core.learn.labelled import class_of
 from graspsense.core.values.errors import counted
+from graspsense.core.values.signals import Phase
 from graspsense.core.values.units import display_unit, in_words, without_underscores
 from graspsense.report.grasp_curve import GraspCurve, peak_in_words
 from graspsense.report.html import figure, folded, panels, table
+from graspsense.report.moments import phase_spans
 from graspsense.report.svg import DASHES, INKS, QUIET, SIZE, TEXT, AxisScale, Picture, reaching
 
 STATES: Final = 8
@@ -120,18 +122,14 @@ def one_grasp(grasp: GraspCurve, caption: str) -> str:
 
 def _phases(picture: Picture, grasp: GraspCurve, t: Sequence[float], x_scale: AxisScale) -> list[str]:
     """Draw the phases behind the lines with their legend, and return the duration of each in words."""
-    start, durations = 0, []
-    phases = grasp.phase
+    durations = []
+    phases = np.array([Phase[name.upper()] for name in grasp.phase[: len(t)]])
     with picture.plot(x_scale, None, FORCE[1], GAP[0]):
-        for k in range(1, len(phases) + 1):
-            if k < len(phases) and phases[k] == phases[start]:
-                continue
-            end = t[min(k, len(t) - 1)]
-            colour = PHASES.get(phases[start], OTHER_PHASE)
-            picture.band(x_scale(t[start]), x_scale(end), FORCE[1], GAP[0], colour)
-            durations.append(f"{phases[start]} for {end - t[start]:.2f}")
-            start = k
-    for k, phase in enumerate(dict.fromkeys(phases)):
+        for phase, begin, end in phase_spans(np.array(t), phases):
+            left, colour = x_scale(begin), PHASES.get(phase, OTHER_PHASE)
+            picture.box(left, FORCE[1], x_scale(end) - left, GAP[0] - FORCE[1], colour)
+            durations.append(f"{phase} for {end - begin:.2f}")
+    for k, phase in enumerate(dict.fromkeys(grasp.phase)):
         x = 36 + 80.0 * k
         picture.box(x, BELOW - 12, 12, 10, PHASES.get(phase, OTHER_PHASE), QUIET)
         picture.text(x + 16, BELOW - 3, phase)

@@ -30,7 +30,8 @@ from graspsense.store.opening import STORE, as_source, place_and_number
 FRAMEWORK: Final = "graspsense"
 _OWN_PLUGINS: Final = "graspsense.plugins"
 _CALIBRATION: Final = "calibration"
-_OF_TRIALS: Final = 'id, recording, sha256, label, instance, set_aside, hex("values")'
+_OF_TRIALS: Final = """SELECT id, recording, recording_bytes, sha256, label, instance, set_aside, hex("values")
+    FROM trial JOIN detail ON detail.trial = id ORDER BY id"""
 _QUOTED: Final = re.compile(r"\"[^\"\n]{1,1000}\"|'[^'\n]{1,1000}'")
 
 
@@ -186,17 +187,26 @@ def _developed_beside(place: str) -> list[str]:
 
 
 def _hash_of_store(folder: str) -> str:
-    """Return a hash of the trials of a store, of their labels, of all changes of them, and of lost recordings."""
+    """Return a hash of the trials of a store, of all changes of them, and of recordings that are lost or were replaced.
+
+    A recording is known by its size: to read all of them takes as long as to evaluate them.
+    """
     from graspsense.store.store import Store
 
     try:
         with Store.read(folder) as store:
-            trials = store.query(f"SELECT {_OF_TRIALS} FROM trial ORDER BY id")
+            trials = store.query(_OF_TRIALS)
             changes = store.query('SELECT trial, "action", "before", "after" FROM change ORDER BY id')
-            lost = [[number] for number, name, *_ in trials if not store.recording_path(name).is_file()]
+            sizes = [_bytes_of(store.recording_path(name)) for _, name, *_ in trials]
+            lost = [[*row[:2], size] for row, size in zip(trials, sizes, strict=True) if size != row[2]]
     except GraspsenseError as error:
         return _hash([str(error)])  # the task tells it
     return _hash([json_text([list(row) for row in (*trials, *changes, *lost)])])
+
+
+def _bytes_of(path: Path) -> int:
+    """Return the size of a file; 0 if there is none."""
+    return path.stat().st_size if path.is_file() else 0
 
 
 def _hash_of_files(path: str, kind: str) -> str:

@@ -12,14 +12,14 @@ from attrs import evolve, field, fields_dict, frozen
 from graspsense.core.components.roles import FeatureSet
 from graspsense.core.components.strict import ValidationFailed, structured
 from graspsense.core.learn.checkpoints import with_checkpoints
-from graspsense.core.learn.labelled import Labelled
+from graspsense.core.learn.labelled import Labelled, rows_of_class
 from graspsense.core.settings.layers import KINDS, read_toml, toml_kind
 from graspsense.core.settings.resolved import Settings
 from graspsense.core.values.errors import ConfigError, PluginUnavailable
 from graspsense.core.values.label_text import alike_words, spelled_alike
 from graspsense.core.values.trace import Trace
 from graspsense.sources.identified import IDENTIFIED, gripper_flags, identified_scenes
-from graspsense.sources.simulated import Group, simulated
+from graspsense.sources.simulated import Group, plan_trials, simulated
 from graspsense.store.opening import STORE, as_source
 
 SIMULATED: Final = "simulated"
@@ -174,9 +174,12 @@ def labelled_trials(
     if source.value is not None and source.kind != "CSV" and not source.source.startswith(STORE):
         raise ConfigError(f"{source.source} has no numbers to predict: they are in a CSV file or in a store")
     if source.kind == "simulated":
+        pipeline, groups = settings(), groups_of(source)
+        if source.only:
+            rows_of_class(plan_trials(pipeline, groups, seed).labels, source.only, source.source)
         trials = simulated(
-            settings(),
-            groups=groups_of(source),
+            pipeline,
+            groups=groups,
             seed=seed,
             progress=progress,
             on_trace=on_trace,

@@ -135,19 +135,17 @@ def set_number(store: Store, numbers: Sequence[int], heading: str, cell: str | N
     it in another unit; SaveFailed, DataDamaged.
     """
     name, _ = name_and_unit(heading)
-    recorded, current = _labels_of_trials(store)
-    if cell is not None:
-        chosen = set(numbers)
-        _refuse_another_unit(heading, [labels for number, labels in current.items() if number not in chosen])
-
-    def change(connection: sqlite3.Connection, trial: TrialSummary) -> None:
-        old = _number_named(current[trial.id], name)
-        new = _number_named(recorded[trial.id], name) if cell is None else f"{heading}={cell}"
-        if old == new:
-            raise ConfigError(f"trial {trial.id} has {new or f'no {name}'} already")
-        _keep(connection, trial.id, "value", old, new, why)
-
-    _for_each(store, numbers, change)
+    with store.transaction() as connection:
+        recorded, current = _labels_of_trials(store)
+        if cell is not None:
+            _refuse_another_unit(heading, [current[number] for number in current.keys() - set(numbers)])
+        for number in dict.fromkeys(numbers):
+            store.trial(number)
+            old = _number_named(current[number], name)
+            new = _number_named(recorded[number], name) if cell is None else f"{heading}={cell}"
+            if old == new:
+                raise ConfigError(f"trial {number} has {new or f'no {name}'} already")
+            _keep(connection, number, "value", old, new, why)
 
 
 def refuse_other_units(store: Store, headings: Iterable[str]) -> None:
@@ -218,10 +216,8 @@ def inconsistencies(store: Store) -> dict[int, str]:
         elif change.action != "value":
             aside[change.trial] = change.action == "aside"
     problems = {}
-    rows = store.query(
-        "SELECT id, label, instance, set_aside, labels FROM trial JOIN detail ON detail.trial = trial.id ORDER BY id"
-    )
-    for number, label, instance, why, recorded in rows:
+    columns = store.columns(("id", "label", "instance", "set_aside", "labels"), "TRUE")
+    for number, label, instance, why, recorded in zip(*columns.values(), strict=True):
         try:
             grasped = json.loads(recorded)
             expected = labels.get(number, word_of(grasped.get("label"), grasped.get("instance")))

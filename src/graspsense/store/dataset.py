@@ -223,17 +223,9 @@ def _controls(store: Store, rows: _Rows, tables: _Tables) -> Controls:
 
 def _read_rows(store: Store, wanted: str, feature_set: int | None) -> _Rows:
     """Return the rows of the wanted trials, with `feature_set` only those that have it."""
-    columns = ", ".join(
-        f"detail.{name}" if name in ("labels", "missing", "missing_before") else f'trial."{name}"'
-        for name in _COLUMNS
-    )
-    of_set = "" if feature_set is None else " AND feature_set = ?"
-    rows = store.query(
-        f"""SELECT {columns} FROM trial JOIN detail ON detail.trial = trial.id
-        WHERE {wanted}{of_set} ORDER BY trial.id""",
-        () if feature_set is None else (feature_set,),
-    )
-    return _Rows(**dict(zip(_COLUMNS, zip(*rows, strict=True), strict=True)))
+    if feature_set is None:
+        return _Rows(**store.columns(_COLUMNS, wanted))
+    return _Rows(**store.columns(_COLUMNS, f"{wanted} AND feature_set = ?", (feature_set,)))
 
 
 def _intact(store: Store, rows: _Rows, notes: list[str]) -> _Rows:

@@ -58,17 +58,6 @@ BEFORE, FIRST, VALUE = "before_contact.", "first_line.", "value."
 """What the name of a column of a CSV file begins with that holds a number of a control, or one to predict."""
 
 
-_SELECTED: Final = (
-    "trial",
-    "made_at",
-    "labels",
-    *ABOUT[ABOUT.index("label") :],
-    "values",
-    "before_set",
-    "before_contact",
-)
-
-
 @frozen(kw_only=True, eq=False)
 class TrialTable:
     """The trials of a store: descriptive columns (`about`), and the features."""
@@ -85,16 +74,13 @@ def trial_table(folder: str | Path) -> TrialTable:
     """Return all trials of a store that are not set aside. Raises ConfigError if there is none, DataDamaged."""
     with Store.read(folder) as store:
         ((set_aside,),) = store.query("SELECT count(*) FROM trial WHERE set_aside IS NOT NULL")
-        rows = store.query(
-            """SELECT id, made_at, detail.labels, label, instance, outcome, complete, origin, trial.device, simulated,
-            recording, feature_set, "values", before_set, before_contact FROM trial
-            JOIN detail ON detail.trial = trial.id WHERE set_aside IS NULL ORDER BY id"""
-        )
-        if not rows:
+        stored = ("id", "made_at", "labels", *ABOUT[ABOUT.index("label") :])
+        columns = store.columns((*stored, "values", "before_set", "before_contact"), "set_aside IS NULL")
+        columns["trial"] = columns.pop("id")
+        if not columns["trial"]:
             aside = f" that is not set aside ({set_aside} are)" if set_aside else ""
             raise ConfigError(f"the store in {folder} has no trial to export{aside}")
         sets = dict(store.query("SELECT id, features FROM feature_set"))
-        columns = dict(zip(_SELECTED, zip(*rows, strict=True), strict=True))
         first_line = first_lines(store, columns["recording"], columns["origin"])
         labels = [decoded(folder, text) for text in columns["labels"]]
         numbers = with_changed_numbers(store, columns["trial"], labels)

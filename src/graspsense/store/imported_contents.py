@@ -28,11 +28,9 @@ class ImportedContents:
         self._folder = store.folder
         self._trials: dict[str, int] = {}
         self._sources: dict[str, int] = {}
-        rows = store.query(
-            """SELECT trial.id, trial.recording, detail.provenance FROM trial JOIN detail ON detail.trial = trial.id
-            WHERE trial.origin = 'import' AND trial.set_aside IS NULL ORDER BY trial.id"""
-        )
-        for number, recording, provenance in rows:
+        imported = "origin = 'import' AND set_aside IS NULL"
+        columns = store.columns(("id", "recording", "provenance"), imported)
+        for number, recording, provenance in zip(*columns.values(), strict=True):
             sha256, source = _stated(provenance, CONTENT), _stated(provenance, "source")
             if source is not None:
                 self._sources.setdefault(source, number)

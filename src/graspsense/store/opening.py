@@ -10,7 +10,7 @@ import shutil
 import sqlite3
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Final
 from urllib.parse import quote
@@ -96,13 +96,13 @@ def make_safe(connection: sqlite3.Connection) -> None:
     connection.execute("PRAGMA foreign_keys = ON")
 
 
-def connect_read_only(path: Path) -> tuple[sqlite3.Connection, Path | None]:
-    """Return a read-only connection, and the folder of a temporary copy if one had to be made."""
+def connect_read_only(path: Path) -> sqlite3.Connection:
+    """Return a read-only connection, to a copy in memory where the log of a writer cannot be read in its place."""
     name = quote(str(path.absolute()))
     connection = sqlite3.connect(f"file:{name}?mode=ro", uri=True, timeout=BUSY_S, isolation_level=None)
     try:
         connection.execute("SELECT count(*) FROM sqlite_schema").fetchone()
-        return connection, None
+        return connection
     except sqlite3.OperationalError as error:
         connection.close()
         if error.sqlite_errorcode & 0xFF not in _NO_SHARED_MEMORY:
@@ -113,11 +113,19 @@ def connect_read_only(path: Path) -> tuple[sqlite3.Connection, Path | None]:
     # A read-only or full disk has no place for the shared-memory file of readers. Without a writer none is needed.
     log = path.with_name(path.name + "-wal")
     if log.is_file() and log.stat().st_size:
-        copy = Path(tempfile.mkdtemp(prefix="graspsense-"))
-        for source in (path, log):
-            shutil.copyfile(source, copy / source.name)
-        return sqlite3.connect(copy / path.name, isolation_level=None), copy
-    return sqlite3.connect(f"file:{name}?immutable=1", uri=True, isolation_level=None), None
+        with tempfile.TemporaryDirectory(prefix="graspsense-") as folder:
+            for source in (path, log):
+                shutil.copyfile(source, Path(folder) / source.name)
+            return in_memory(sqlite3.connect(Path(folder) / path.name))
+    return sqlite3.connect(f"file:{name}?immutable=1", uri=True, isolation_level=None)
+
+
+def in_memory(connection: sqlite3.Connection) -> sqlite3.Connection:
+    """Return a copy of this database in memory, instead of the connection, which is closed."""
+    with closing(connection):
+        copy = sqlite3.connect(":memory:", isolation_level=None)
+        connection.backup(copy)
+    return copy
 
 
 _NO_SHARED_MEMORY: Final = (
@@ -182,13 +190,19 @@ STORE: Final = "store:"
 def store_folder(text: str | os.PathLike[str]) -> str:
     """Return the folder of a store, however it is named: `store:trials`, `trials`, `trials/store.sqlite`.
 
+    Raises ConfigError for an empty text.
+
     >>> store_folder("store:trials")
     'trials'
     """
-    name = os.fspath(text)
-    if name.startswith(STORE) and not Path(name).exists():
-        name = name.removeprefix(STORE)
-    path = Path(name).expanduser()
+    name = os.path.expanduser(text)
+    if name.startswith(STORE) and not os.path.exists(name):
+        name = os.path.expanduser(name.removeprefix(STORE))
+    if not name:
+        raise ConfigError(
+            "an empty text names no folder: name the one of a store, or . for the current folder"
+        )
+    path = Path(name)
     return str(path.parent) if path.name == FILE and path.is_file() else name
 
 
@@ -206,7 +220,6 @@ def as_source(text: str) -> str:
     """Return a source of trials or recordings with `store:` before the folder of a store; others as they are."""
     if not text.startswith(STORE):
         for name, mark, number in ((text, "", ""), text.rpartition("#")):
-            folder = store_folder(name)
-            if name and os.path.isfile(Path(folder).expanduser() / FILE):
+            if name and os.path.isfile(os.path.join(folder := store_folder(name), FILE)):
                 return f"{STORE}{folder}{mark}{number}"
     return text

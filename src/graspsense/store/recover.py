@@ -97,7 +97,7 @@ def recover_file(path: str | Path, out: str | Path | None = None) -> Recovered:
     `out` is `NAME-recovered.mcap` in the same folder by default. Raises ConfigError if the file does not exist or is
     complete, DataDamaged if no tick can be read, SaveFailed if the copy cannot be written.
     """
-    path = Path(path).expanduser()
+    path = Path(os.path.expanduser(path))
     with _locked(path) as mine:
         if not mine:
             raise ConfigError(f"{path} is being written")
@@ -106,7 +106,7 @@ def recover_file(path: str | Path, out: str | Path | None = None) -> Recovered:
             raise ConfigError(f"{path} is complete: there is nothing to recover")
         if not len(grasp):
             raise DataDamaged(f"no tick can be read from {path}: {grasp.damage or 'it has none'}")
-        target = Path(out).expanduser() if out else _beside(path)
+        target = Path(os.path.expanduser(out)) if out else _beside(path)
         with _writing(target):
             write_copy(grasp, target)
     return Recovered(file=path, what="recovered", recording=target, ticks=len(grasp), why=_why(grasp))

@@ -11,7 +11,6 @@ from __future__ import annotations
 import os
 import re
 import secrets
-import shutil
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -29,6 +28,7 @@ from graspsense.store.opening import (
     checked_version,
     connect_read_only,
     damaged,
+    in_memory,
     is_new,
     make_safe,
     refuse_read_fault,
@@ -66,8 +66,8 @@ class Store:
     Every method raises DataDamaged if the file is not what a store of this version is.
     """
 
-    def __init__(self, folder: Path, connection: sqlite3.Connection, copy: Path | None = None) -> None:
-        self.folder, self._connection, self._copy = folder, connection, copy
+    def __init__(self, folder: Path, connection: sqlite3.Connection) -> None:
+        self.folder, self._connection = folder, connection
 
     @classmethod
     def open(cls, folder: str | Path) -> Store:
@@ -75,7 +75,7 @@ class Store:
 
         Raises SaveFailed if it cannot be written, ConfigError if its version is newer, DataDamaged.
         """
-        folder = Path(store_folder(folder)).expanduser()
+        folder = Path(store_folder(folder))
         try:
             (folder / RECORDINGS).mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -100,35 +100,32 @@ class Store:
 
     @classmethod
     def read(cls, folder: str | Path) -> Store:
-        """Open a store to read only, also on a read-only disk.
+        """Open a store to read only, also on a read-only disk; one of an older version is migrated in memory.
 
         Raises ConfigError if there is no store or its version is newer, DataDamaged.
         """
-        folder = Path(store_folder(folder)).expanduser()
+        folder = Path(store_folder(folder))
         path = folder / FILE
         if not path.is_file():
             raise ConfigError(f"there is no store in {folder}: it has no file {FILE}")
         if is_new(folder):
             raise ConfigError(f"the store in {folder} is empty")
         with sqlite_errors(folder):
-            store = cls(folder, *connect_read_only(path))
+            connection = connect_read_only(path)
             try:
-                make_safe(store._connection)
-                version = checked_version(store._connection, folder)
+                make_safe(connection)
+                version = checked_version(connection, folder)
+                if version < NEWEST:
+                    connection = in_memory(connection)
+                    migrate(connection, version)
             except BaseException:
-                store.close()
+                connection.close()
                 raise
-        if version < NEWEST:
-            store.close()
-            cls.open(folder).close()
-            return cls.read(folder)
-        return store
+        return cls(folder, connection)
 
     def close(self) -> None:
         """Close the store. Everything written is already on the disk."""
         self._connection.close()
-        if self._copy is not None:
-            shutil.rmtree(self._copy, ignore_errors=True)
 
     def __enter__(self) -> Store:
         return self
@@ -240,6 +237,20 @@ class Store:
         query = f"SELECT {SUMMARY_COLUMNS} FROM trial" + (f" WHERE {' AND '.join(where)}" if where else "")
         rows = self.query(f"{query} ORDER BY id DESC LIMIT ?", (*values, limit))
         return [TrialSummary.from_row(row) for row in rows]
+
+    def columns(
+        self, names: Sequence[str], where: str, values: Sequence[object] = ()
+    ) -> dict[str, tuple[Any, ...]]:
+        """Return these columns of the trials that an SQL condition selects, oldest first; `device` is its name."""
+        selected = ", ".join(
+            f'{"detail" if name in DETAIL_COLUMNS and name != "device" else "trial"}."{name}"'
+            for name in names
+        )
+        query = (
+            f"SELECT {selected} FROM trial JOIN detail ON detail.trial = trial.id WHERE {where} ORDER BY id"
+        )
+        rows = self.query(query, values)
+        return dict(zip(names, zip(*rows, strict=True) if rows else [()] * len(names), strict=True))
 
     def recording_names(self) -> set[str]:
         """Return the names of all recordings that have a row."""

@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-_commands = 0
+_commands = False
 
 
 @contextmanager
-def command_line() -> Iterator[None]:
-    """Have messages inside this context name options as commands take them."""
+def command_line(*, taken: bool = True) -> Iterator[None]:
+    """Have messages inside this context name options as commands take them, or as functions do if not `taken`."""
     global _commands
-    _commands += 1
+    outside, _commands = _commands, taken
     try:
         yield
     finally:
-        _commands -= 1
+        _commands = outside
 
 
 def option(name: str, value: str = "", *, python: str = "") -> str:

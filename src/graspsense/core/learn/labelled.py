@@ -181,14 +181,7 @@ class Labelled:
         """Return the trials of one class. Raises ConfigError if there are none."""
         import numpy as np
 
-        chosen = np.array([class_of(label) == name for label in self.labels])
-        if not chosen.any():
-            known = sorted({class_of(label) for label in self.labels})
-            raise ConfigError(
-                f"no trial of class {name!r} in {self.source}. Known: {', '.join(known)}."
-                + suggestion(name, known)
-            )
-        return self.rows(np.flatnonzero(chosen))
+        return self.rows(np.array(rows_of_class(self.labels, name, self.source)))
 
     def aimed(self, target: str) -> Labelled:
         """Return the trials with one of `TARGETS` as labels.
@@ -238,6 +231,16 @@ def _refuse_large_target(target: TargetValue, source: str) -> None:
 def recognised(target: Target, labels: Sequence[str]) -> Target:
     """Return what a correct prediction of these labels recognises: the class, if they have no state."""
     return "class" if target == "both" and not any(":" in label for label in labels) else target
+
+
+def rows_of_class(labels: Sequence[str], name: str, source: str) -> list[int]:
+    """Return the numbers of the trials of one class of this source. Raises ConfigError if there are none."""
+    rows = [row for row, label in enumerate(labels) if class_of(label) == name]
+    if not rows:
+        known = sorted(set(map(class_of, labels)))
+        told = f"no trial of class {name!r} in {source}. Known: {', '.join(known)}."
+        raise ConfigError(told + suggestion(name, known))
+    return rows
 
 
 def class_of(label: str) -> str:
