@@ -7,9 +7,8 @@ from numpy.typing import ArrayLike
 
 from graspsense_c45.arithmetic import TOLERANCE
 from graspsense_c45.arrays import Indices, Reals
-from graspsense_c45.splits import LEAF, Splits
 from graspsense_c45.table import check_values
-from graspsense_c45.tree import Tree, largest_class
+from graspsense_c45.tree import LEAF, Splits, Tree, largest_class
 
 CHUNK = 16_384
 """Rows that are routed together: their arrays fit into the processor's caches."""
