@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Any, Final, TypeVar
 
 import click
@@ -122,7 +122,7 @@ def dashed(name: str) -> str:
     return f"--{name.replace('_', '-')}"
 
 
-def refuse_typed(names: Sequence[str], why: str) -> None:
+def refuse_typed(names: Collection[str], why: str) -> None:
     """Raise UsageError for an option among these that the user has typed: `--png` and why not."""
     for name in typed():
         if name in names:
@@ -155,6 +155,6 @@ def settings_of(
     return resolve(
         pipeline if pipeline is not None else DEFAULT_PIPELINE,
         options=options,
-        flags=[flag for flag in flags if flag.value is not None],
+        flags=flags,
         force=force,
     )

@@ -107,21 +107,8 @@ _OPTIONS: Final = (
     force_option,
 )
 
-_ONLY_FOR: Final = {
-    "CSV": ("label", "instance", "order", "features", "before"),
-    "data set": ("unreliable",),
-    SIMULATED: (
-        "objects",
-        "instances",
-        "trials",
-        "states_per_instance",
-        "calibration_instances",
-        "pipeline",
-        "gripper",
-    ),
-}
-
-
+_SIMULATED_TOO: Final = ("calibration_instances", "pipeline", "gripper")
+"""Options for simulated trials that are no keys of `TrialSource`."""
 _SAME_KEYS: Final = (
     *("only", "label", "instance", "order", "unreliable"),
     *("instances", "trials", "states_per_instance"),
@@ -236,7 +223,10 @@ def trials_of(
         described = structured(values, TrialSource, source)
     except ValidationFailed as misfit:
         raise ConfigError(
-            "\n".join(f"{dashed(str(problem.path[0]))}: {problem.words()}" for problem in misfit.problems)
+            "\n".join(
+                f"{'SOURCE' if problem.path == ('source',) else dashed(str(problem.path[0]))}: {problem.words()}"
+                for problem in misfit.problems
+            )
         ) from None
     if kind == SIMULATED and folds is not None:
         from graspsense.evaluation.folds import check_folds
@@ -310,26 +300,26 @@ def command_line(without: Sequence[str], command: str = "") -> str:
 
 def _refuse_misplaced(kind: str) -> None:
     """Refuse options that say nothing about this kind of source. Raises UsageError."""
-    for owner, names in _ONLY_FOR.items():
+    from graspsense.sources.trial_source import KEYS_OF_KIND
+
+    for owner, keys in KEYS_OF_KIND.items():
         if owner != kind:
             why = f"is for a source of the kind {owner!r}; this one is of the kind {kind!r}"
-            if "features" in names:
+            if owner == "CSV":
                 refuse_typed(["features"], f"{why}: a feature set is selected by -o features.type=NAME")
-            refuse_typed(names, why)
+            refuse_typed((*keys, *(_SIMULATED_TOO if owner == SIMULATED else ())), why)
 
 
 def _settings(source: str, given: Mapping[str, Any], classifier: str | None) -> Settings:
     from graspsense.sources.identified import gripper_flags
 
-    flags = gripper_flags(source)
-    flags += [Flag("--gripper", "gripper.type", given["gripper"])] if given["gripper"] else []
-    if classifier:
-        flags.append(Flag("--classifier", "classifier.type", classifier))
+    flags = (
+        *gripper_flags(source),
+        Flag("--gripper", "gripper.type", given["gripper"]),
+        Flag("--classifier", "classifier.type", classifier),
+    )
     settings = resolve(given["pipeline"], options=given["options"], flags=flags, force=given["force"])
-    if settings.classifier is None:
-        flags.append(Flag("--classifier", "classifier.type", DEFAULT_CLASSIFIER))
-        settings = resolve(given["pipeline"], options=given["options"], flags=flags, force=given["force"])
-    return settings
+    return settings if settings.classifier else _settings(source, given, DEFAULT_CLASSIFIER)
 
 
 def _alone(table: str, name: str, given: Mapping[str, Any], source: str) -> SelectedComponent:

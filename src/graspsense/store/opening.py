@@ -98,7 +98,7 @@ def make_safe(connection: sqlite3.Connection) -> None:
 
 def connect_read_only(path: Path) -> tuple[sqlite3.Connection, Path | None]:
     """Return a read-only connection, and the folder of a temporary copy if one had to be made."""
-    name = quote(str(path.absolute()))
+    name = quote(os.fsencode(path.absolute()))
     connection = sqlite3.connect(f"file:{name}?mode=ro", uri=True, timeout=BUSY_S, isolation_level=None)
     try:
         connection.execute("SELECT count(*) FROM sqlite_schema").fetchone()

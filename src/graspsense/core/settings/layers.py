@@ -130,7 +130,7 @@ class Layer:
 
 @frozen
 class Flag:
-    """A command-line flag that sets one key: `Flag("--gripper", "gripper.type", "pr2")`."""
+    """A command-line flag that sets one key: `Flag("--gripper", "gripper.type", "pr2")`; None is one not given."""
 
     name: str
     key: str

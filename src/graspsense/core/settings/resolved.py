@@ -114,7 +114,7 @@ def resolve(
         layers.append(experiment)
     typed, complaints = option_layers(options)
     layers += typed
-    layers += [flag.layer() for flag in flags]
+    layers += [flag.layer() for flag in flags if flag.value is not None]
     return _resolved_layers(pipeline, layers, complaints, plugins, force=force)
 
 
@@ -303,9 +303,8 @@ def _tables_only(layer: Layer, complaints: list[_Complaint]) -> Layer:
             path = typed_path(layer) if layer.typed else (key,)
             complaints.append((layer, InvalidValue(path, f"a pipeline has no table {key!r}.", _TABLES)))
         elif not isinstance(value, Mapping):
-            advice = (
-                f": write {key}.type = {toml_value(value)}" if isinstance(value, str) and key != "run" else ""
-            )
+            name = isinstance(value, str) and key != "run"
+            advice = f": write {key}.type = {toml_value(value)}" if name else f": set a key of it, {key}.KEY"
             complaints.append(
                 layer.complain(InvalidValue((key,), f"expected a table, found {shown(value)}{advice}"))
             )
