@@ -220,6 +220,12 @@ def objects_can_be_grasped(subject: Subject) -> None:
     names = [name for kind in kinds for name in kind.full_names]
     twice = {name for name in names if names.count(name) > 1}
     demand(not twice, f"objects() gives {', '.join(sorted(twice))} twice: give each full name once")
+    held = {name: repr(subject.create().with_object(name).config) for name in names}
+    demand(
+        len(set(held.values())) == len(names),
+        f"with_object gives the same settings for several of {', '.join(names)}: take the name in, as in "
+        "`type(self)(attrs.evolve(self.config, object=name))`",
+    )
     for kind in kinds:
         name = kind.full_names[0]
         with (

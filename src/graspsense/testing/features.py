@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import time
 from copy import deepcopy
+from math import nan
 from typing import Any, Final
 
 import numpy as np
@@ -14,7 +15,7 @@ from graspsense.core.components.compiled_features import columns_of_ticks, compi
 from graspsense.core.components.roles import FeatureSet
 from graspsense.core.values.features import Features
 from graspsense.core.values.signals import Phase
-from graspsense.core.values.trace import Trace
+from graspsense.core.values.trace import TICK_COLUMNS, Trace
 from graspsense.core.values.units import is_si
 from graspsense.testing.checks import demand, leaving_no_thread, raises_nothing
 from graspsense.testing.samples import (
@@ -132,6 +133,18 @@ def a_whole_grasp_has_features(subject: Subject) -> None:
     )
 
 
+def width_is_a_gap_of_the_grasp(subject: Subject) -> None:
+    """The feature that is the width of the object lies within the gaps of the grasp."""
+    trace, name = _whole(subject), subject.entry.width
+    width = nan if name is None else _features(subject, trace)[name]
+    low, high = float(trace.gap_m.min()), float(trace.gap_m.max())
+    demand(
+        width != width or low <= width <= high,
+        f"{name!r} is the width of the object, and {width:g} in a grasp with gaps from {low:g} to {high:g} m: give it "
+        "in metres, or leave `width=True` out",
+    )
+
+
 def handles_a_trace_that_ends_anywhere(subject: Subject) -> None:
     """`extract(trace.until(t))` works for every t, as early recognition needs it."""
     whole = _whole(subject)
@@ -181,16 +194,35 @@ def does_not_change_the_trace(subject: Subject) -> None:
 
 
 def requires_what_it_reads(subject: Subject) -> None:
-    """The channels in `requires` suffice: without the others, the features are the same."""
+    """The channels in `requires` suffice: without the others, the features are the same, whichever pad bears more."""
     required = {require.name for require in subject.entry.requires}
-    full = _features(subject, _whole(subject))
-    own = _features(subject, with_channels(_whole(subject), required), "a grasp")
     others = [name for name in COLUMNS_OF_CHANNEL if name not in required]
-    demand(
-        _same(full, own),
-        f"without the channels it does not declare ({', '.join(others)}) it gives {own.as_dict()} instead of "
-        f"{full.as_dict()}: add the channels that it reads to `requires`",
+    whole = _whole(subject)
+    turned = evolve(whole, force_left_n=whole.force_right_n, force_right_n=whole.force_left_n)
+    for trace in (whole, turned):
+        full, own = _features(subject, trace), _features(subject, with_channels(trace, required), "a grasp")
+        demand(
+            _same(full, own),
+            f"without the channels it does not declare ({', '.join(others)}) it gives {own.as_dict()} instead of "
+            f"{full.as_dict()}: add the channels that it reads to `requires`",
+        )
+
+
+def times_are_those_of_the_clock(subject: Subject) -> None:
+    """A feature in seconds, or per second, is not twice or half as large where half of the ticks are missing."""
+    whole = _whole(subject)
+    columns = {name: getattr(whole, name)[::2] for name in TICK_COLUMNS}
+    fewer = evolve(
+        whole, **columns, signals=with_signals(evolve(whole, **columns), subject.entry.requires).signals
     )
+    every, half = _features(subject, whole), _features(subject, fewer, "a grasp with half of its ticks")
+    for name, unit, a, b in zip(every.names, every.units, every.values, half.values, strict=True):
+        counts = unit == "s" or unit.endswith("/s")
+        demand(
+            not (counts and a and min(abs(b / a - 0.5), abs(b / a - 2.0)) < 0.05),
+            f"feature {name!r} is {a:g} {unit}, and {b:g} {unit} where half of the ticks are missing: take times from "
+            "`trace.t_s`, not from the number of ticks",
+        )
 
 
 def independent_of_the_start_of_the_clock(subject: Subject) -> None:

@@ -52,8 +52,7 @@ def node_distributions(tree: Tree, laplace: bool) -> Reals:
         of_nodes = (weights + 1.0) / (total + n_classes)[:, None]
     else:
         of_nodes = weights / np.where(total > 0, total, 1.0)[:, None]
-    empty = np.flatnonzero((total < TOLERANCE) & (tree.parent >= 0))
-    of_nodes[empty] = of_nodes[tree.parent[empty]]
+    of_nodes[tree.empty] = of_nodes[tree.parent[tree.empty]]
     return np.asarray(of_nodes)
 
 

@@ -132,8 +132,18 @@ class Tree:
 
     @cached_property
     def majority_class(self) -> Indices:
-        """The class of each node: the first one that no other exceeds by more than the tolerance."""
-        return largest_class(self.class_weights)
+        """The class of each node: the first one that no other exceeds by more than the tolerance.
+
+        A leaf without training weight has that of its parent.
+        """
+        chosen = largest_class(self.class_weights)
+        chosen[self.empty] = chosen[self.parent[self.empty]]
+        return chosen
+
+    @cached_property
+    def empty(self) -> Indices:
+        """The leaves without training weight, as of a nominal value that no row has."""
+        return np.flatnonzero((self.weighted_n_node_samples < TOLERANCE) & (self.parent >= 0))
 
     @cached_property
     def parent(self) -> Indices:
