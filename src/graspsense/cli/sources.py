@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, TypeVar
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
@@ -14,6 +14,7 @@ from graspsense.cli.options import (
     dashed,
     force_option,
     keys_option,
+    option_group,
     pipeline_option,
     refuse_typed,
     typed,
@@ -34,8 +35,6 @@ if TYPE_CHECKING:
     from graspsense.core.learn.labelled import Labelled
     from graspsense.core.values.features import FeatureTable
 
-CommandT = TypeVar("CommandT", bound=Callable[..., Any])
-
 SIMULATED: Final = "simulated"
 DEFAULT_CLASSIFIER: Final = "c45"
 
@@ -51,7 +50,7 @@ SOURCES: Final = """\b
                    `graspsense identify` has identified
     """
 
-_OPTIONS: Final = (
+source_options = option_group(
     click.option("--label", metavar="COLUMN", help="CSV: column of the label."),
     click.option(
         "--instance",
@@ -106,6 +105,7 @@ _OPTIONS: Final = (
     click.option("--seed", type=SEED, default=0, show_default=True, help="Seed of all random numbers."),
     force_option,
 )
+"""The options that say where trials come from; they arrive as keywords for `trials_of`."""
 
 _SIMULATED_TOO: Final = ("calibration_instances", "pipeline", "gripper")
 """Options for simulated trials that are no keys of `TrialSource`."""
@@ -116,26 +116,28 @@ _SAME_KEYS: Final = (
 """Options that are keys of `TrialSource` as they are."""
 
 
-def source_options(command: CommandT) -> CommandT:
-    """Add the options that say where trials come from; they arrive as keywords for `trials_of`."""
-    for option in reversed(_OPTIONS):
-        command = option(command)
-    return command
-
-
-def classifier_option(command: CommandT) -> CommandT:
-    """Add --classifier."""
-    return click.option(
-        "--classifier",
-        metavar="NAME",
-        help="c45, svm, mlp, forest, extra-trees, boosted, ebm, knn, tree, or another. "
-        f"[{DEFAULT_CLASSIFIER}] (classifier.type)",
-    )(command)
-
-
-def source_argument(command: CommandT) -> CommandT:
-    """Add the argument SOURCE; the folder of a store needs no `store:`."""
-    return click.argument("source", callback=named_source)(command)
+classifier_option = click.option(
+    "--classifier",
+    metavar="NAME",
+    help="c45, svm, mlp, forest, extra-trees, boosted, ebm, knn, tree, or another. "
+    f"[{DEFAULT_CLASSIFIER}] (classifier.type)",
+)
+folds_option = click.option(
+    "--folds", type=click.IntRange(min=2), default=10, show_default=True, help="Number of folds."
+)
+keep_option = click.option(
+    "--keep",
+    metavar="FILE",
+    callback=file_to_write,
+    help="Write the features of all trials as a CSV file.",
+)
+"""The file that `keep_features` writes."""
+checkpoints_option = click.option(
+    "--checkpoints",
+    metavar="SECONDS",
+    help="Also predict so many seconds after the contact, comma-separated, as in 0.1,0.2,0.4.",
+)
+"""`checkpoints_of` reads its text."""
 
 
 def named_source(_ctx: click.Context, _param: click.Parameter, value: Any) -> Any:
@@ -143,26 +145,13 @@ def named_source(_ctx: click.Context, _param: click.Parameter, value: Any) -> An
     return tuple(map(as_source, value)) if isinstance(value, tuple) else as_source(value)
 
 
+source_argument = click.argument("source", callback=named_source)
+"""The argument SOURCE; the folder of a store needs no `store:`."""
+
+
 def named_store(_ctx: click.Context, _param: click.Parameter, value: str) -> str:
     """Callback of the argument for the folder of a store, which may be named as `store:DIR` as well."""
     return store_folder(value)
-
-
-def folds_option(command: CommandT) -> CommandT:
-    """Add --folds."""
-    return click.option(
-        "--folds", type=click.IntRange(min=2), default=10, show_default=True, help="Number of folds."
-    )(command)
-
-
-def keep_option(command: CommandT) -> CommandT:
-    """Add --keep, the file that `keep_features` writes."""
-    return click.option(
-        "--keep",
-        metavar="FILE",
-        callback=file_to_write,
-        help="Write the features of all trials as a CSV file.",
-    )(command)
 
 
 def keep_features(keep: str | None, labelled: Labelled) -> None:
@@ -171,15 +160,6 @@ def keep_features(keep: str | None, labelled: Labelled) -> None:
         from graspsense.sources.trial_table.features_csv import write_labelled
 
         write_labelled(Path(keep), labelled)
-
-
-def checkpoints_option(command: CommandT) -> CommandT:
-    """Add --checkpoints; `checkpoints_of` reads its text."""
-    return click.option(
-        "--checkpoints",
-        metavar="SECONDS",
-        help="Also predict so many seconds after the contact, comma-separated, as in 0.1,0.2,0.4.",
-    )(command)
 
 
 def is_csv(source: str) -> bool:
