@@ -175,7 +175,7 @@ def _resolved_layers(
             continue
         if not force:
             doubted = (value for value in implausible_values(config) if value.path[0] not in followed)
-            doubts += _lines(merged, [value.under(table) for value in doubted])
+            doubts += [_in_a_line(merged.owner_of((table, *v.path)), v.under(table)) for v in doubted]
         if component is None:
             run = config
             values[table] = plain(config)
@@ -199,10 +199,6 @@ def _resolved_layers(
         values=values,
         origins=origins,
     )
-
-
-def _lines(merged: Merged, values: Sequence[InvalidValue]) -> list[str]:
-    return [_in_a_line(merged.owner_of(value.path), value) for value in values]
 
 
 _Complaint = str | tuple[Layer | None, InvalidValue]
