@@ -209,20 +209,28 @@ def requires_what_it_reads(subject: Subject) -> None:
 
 
 def times_are_those_of_the_clock(subject: Subject) -> None:
-    """A feature in seconds, or per second, is not twice or half as large where half of the ticks are missing."""
+    """A feature in seconds, or per second, does not follow the number of ticks of the same time."""
     whole = _whole(subject)
-    columns = {name: getattr(whole, name)[::2] for name in TICK_COLUMNS}
-    fewer = evolve(
-        whole, **columns, signals=with_signals(evolve(whole, **columns), subject.entry.requires).signals
+    every, *others = (
+        _features(subject, _of_each(k, whole, subject), "a grasp with fewer ticks") for k in (1, 2, 4)
     )
-    every, half = _features(subject, whole), _features(subject, fewer, "a grasp with half of its ticks")
-    for name, unit, a, b in zip(every.names, every.units, every.values, half.values, strict=True):
-        counts = unit == "s" or unit.endswith("/s")
-        demand(
-            not (counts and a and min(abs(b / a - 0.5), abs(b / a - 2.0)) < 0.05),
-            f"feature {name!r} is {a:g} {unit}, and {b:g} {unit} where half of the ticks are missing: take times from "
-            "`trace.t_s`, not from the number of ticks",
+    for i, (name, unit, value) in enumerate(zip(every.names, every.units, every.values, strict=True)):
+        fewer = [features.values[i] for features in others]
+        counted = all(
+            min(abs(few - value / k), abs(few - value * k)) <= 0.03 * abs(few) and abs(few) > 1e-9
+            for k, few in zip((2, 4), fewer, strict=True)
         )
+        demand(
+            not (counted and (unit == "s" or unit.endswith("/s"))),
+            f"feature {name!r} is {value:g} {unit}, and {fewer[0]:g} {unit} where half of the ticks are missing: take "
+            "times from `trace.t_s`, not from the number of ticks",
+        )
+
+
+def _of_each(k: int, trace: Trace, subject: Subject) -> Trace:
+    """Return the trace with each k-th of its ticks."""
+    fewer = evolve(trace, **{name: getattr(trace, name)[::k] for name in TICK_COLUMNS}, signals={})
+    return with_signals(fewer, subject.entry.requires)
 
 
 def independent_of_the_start_of_the_clock(subject: Subject) -> None:
