@@ -803,7 +803,7 @@ class Unzeroed(Hand):
 hand("pads-can-be-zeroed", "raise TareRefused", tare=lambda self, images: setattr(self, "_zero", images[-1]))
 
 
-@mutant("closes-in-any-state", "for the second time it raised")
+@mutant("closes-in-any-state", "closed twice after the first opening, it raised")
 class Once(Hand):
     def close(self):
         if self._bench is None and hasattr(self, "_info"):
