@@ -307,6 +307,27 @@ peak(
 )
 
 
+featuring(
+    "width-is-a-gap-of-the-grasp",
+    "give it in metres",
+    entry={"features": (Feature("peak", "m", "gap", width=True),)},
+    units=("m",),
+    values=(60.0,),
+)
+featuring(
+    "times-are-those-of-the-clock",
+    "not from the number of ticks",
+    entry={"features": (Feature("peak", "s", "time of the force"),)},
+    units=("s",),
+    values=lambda features, trace: (0.002 * np.count_nonzero(trace.force_left_n > 1.0),),
+)
+measuring(
+    "requires-what-it-reads",
+    "add the channels that it reads",
+    lambda value, trace: float(np.fmax(trace.force_left_n, trace.force_right_n).max()),
+)
+
+
 # Controllers.
 
 
@@ -740,6 +761,11 @@ hand(
     with_object=lambda self, name: fail(UnknownName(f"no object named {name!r}")),
 )
 hand(
+    GRASPED,
+    "the same settings for several of cup:full, cup:empty",
+    with_object=lambda self, name: type(self)(self.config),
+)
+hand(
     GRASPED, "give each full name once", objects=lambda self: (ObjectKind(name="cup"), ObjectKind(name="cup"))
 )
 
@@ -777,7 +803,7 @@ class Unzeroed(Hand):
 hand("pads-can-be-zeroed", "raise TareRefused", tare=lambda self, images: setattr(self, "_zero", images[-1]))
 
 
-@mutant("closes-in-any-state", "for the second time it raised")
+@mutant("closes-in-any-state", "closed twice after the first opening, it raised")
 class Once(Hand):
     def close(self):
         if self._bench is None and hasattr(self, "_info"):
@@ -962,6 +988,25 @@ class Remembering(Nearest):
         self._model |= {"mean": (earlier or self._model)["mean"]}
 
 
+class Shared(Nearest):
+    def fit(self, table, labels, seed):
+        super().fit(table, labels, seed)
+        type(self)._model = vars(self).pop("_model")
+
+
+def overflowing(self, table):
+    centres, scale = np.array(self._model["centres"]), np.array(self._model["scale"])
+    scaled = np.nan_to_num((table.columns(self._model["features"]).values - self._model["mean"]) / scale)
+    with np.errstate(all="ignore"):
+        weight = np.exp(scaled @ centres.T - 0.5 * (centres**2).sum(axis=1))
+        return weight / weight.sum(axis=1, keepdims=True)
+
+
+def with_missing_in_the_mean(self, table, labels, seed):
+    Nearest.fit(self, table, labels, seed)
+    self._model["mean"] = table.values.mean(axis=0).tolist()
+
+
 class InTheOrderOfASet(Nearest):
     def fit(self, table, labels, seed):
         super().fit(table, labels, seed)
@@ -979,6 +1024,9 @@ class Pickled(Nearest):
 
 
 mutant("same-seed-same-model", "keep nothing of what it was fitted to before")(Remembering)
+mutant("same-seed-same-model", "nothing in the class, which others share")(Shared)
+nearest("probabilities-are-valid", "times as large as in training", probabilities=overflowing)
+nearest("separates-separable-trials", "the values that are there", fit=with_missing_in_the_mean)
 mutant("same-model-elsewhere", "sort what comes out of a set")(InTheOrderOfASet)
 mutant("survives-json", "from_json makes the interpreter unpickle")(Pickled)
 nearest(

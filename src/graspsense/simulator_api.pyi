@@ -18,7 +18,7 @@ from graspsense.core.components.setting import CHANGES_NO_RESULT as CHANGES_NO_R
 from graspsense.core.components.strict import ValidationFailed as ValidationFailed
 from graspsense.core.components.strict import structured as structured
 from graspsense.core.settings.layers import read_toml as read_toml
-from graspsense.core.files.toml_file import settings_text as settings_text
+from graspsense.core.files.toml_text import settings_text as settings_text
 from graspsense.core.settings.layers import toml_layer as toml_layer
 from graspsense.core.files.toml_text import toml_values as toml_values
 from graspsense.core.values.errors import suggestion as suggestion

@@ -28,7 +28,7 @@ def test_a_part_that_conforms():
 
 def test_a_part_that_does_not():
     broken_rule = ("feature-set", "requires-what-it-reads")
-    (broken,) = [mutant for mutant in MUTANTS if (mutant.role, mutant.check) == broken_rule]
+    broken, *_ = [mutant for mutant in MUTANTS if (mutant.role, mutant.check) == broken_rule]
     with IsolatedPlugins(parts.offering(broken.entry)):
         code, out, _ = graspsense("plugins", "check", "peak", "--json")
 

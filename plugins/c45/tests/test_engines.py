@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from graspsense_c45 import Attribute, Options, Schema, engines, fit, fitting, make_table
-from graspsense_c45.engines import Fits, choose_fast
+from graspsense_c45.engines import Fits
 
 pytest.importorskip("numba", reason="the extra 'fast' (numba) is not installed: nothing is compiled")
 
@@ -119,10 +119,9 @@ def test_same_tree_on_the_awkward_sets(path):
 
 
 def test_auto_compiles_only_what_pays():
-    assert not choose_fast("plain", 10**9)
-    assert not choose_fast("auto", 6_000)
-    assert choose_fast("auto", 6_000_000)
-    assert choose_fast("fast", 1)
+    chosen = {("plain", 10**9): False, ("auto", 6_000_000): True, ("fast", 1): True}
+
+    assert {case: Fits().choose_fast(*case, True) for case in chosen} == chosen
 
 
 def test_many_small_fits_use_compiled_code_once_the_plain_form_took_as_long(monkeypatch):

@@ -94,6 +94,9 @@ def test_dot_has_every_node_and_edge_and_quotes():
     schema = Schema((Attribute('a "b"'),), ('"', "\\"))
     quoted = fit(make_table(schema, [[0.0]] * 3 + [[1.0]] * 3, [0] * 3 + [1] * 3))
     assert '[label="a \\"b\\""]' in to_dot(quoted)
+    colours = Schema((Attribute("colour", values=("red", "green", "blue")),), ("a", "b", "c"))
+    without_blue = fit(make_table(colours, [[0]] * 5 + [[1]] * 6, [1] * 5 + [2] * 6))
+    assert 'n3 [label="c\\n0"' in to_dot(without_blue)
 
 
 @pytest.mark.slow

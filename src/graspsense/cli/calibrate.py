@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from math import isfinite
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import attrs
 import click
 
-from graspsense.cli.options import pipeline_options, settings_of
+from graspsense.cli.options import option_group, pipeline_options, settings_of
 from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import Subcommands, echo, echo_table, talk
 from graspsense.core.grasp import calibration
@@ -46,14 +46,11 @@ class _Setup(NamedTuple):
     first_effort_n: float
 
 
-def _options(command: Callable[..., Any]) -> Callable[..., Any]:
-    command = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")(command)
-    command = click.option(
-        "--replace",
-        is_flag=True,
-        help="Replace the stored calibration without comparing with it.",
-    )(command)
-    return pipeline_options(command)
+_options = option_group(
+    pipeline_options,
+    click.option("--replace", is_flag=True, help="Replace the stored calibration without comparing with it."),
+    click.option("--json", "as_json", is_flag=True, help="Print the result as JSON."),
+)
 
 
 @click.group(cls=Subcommands)

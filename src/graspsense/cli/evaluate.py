@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from graspsense.cli.events import evaluate_events
-from graspsense.cli.options import Seconds, target_option
+from graspsense.cli.options import Seconds, refuse_typed, target_option
 from graspsense.cli.output import check_outputs, echo_json, file_to_write_as, page_to_write
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import (
@@ -93,6 +93,7 @@ def evaluate(
     if given["events"]:
         evaluate_events(source, given["tolerance"], folds, as_json, given)
         return
+    refuse_typed(["tolerance"], "is for --events")
     from graspsense.core.learn.checkpoints import checkpoints_of
 
     check_outputs(keep, overwrite=overwrite, sources=[source])

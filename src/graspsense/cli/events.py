@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
-from graspsense.cli.options import refuse_typed
+from graspsense.cli.options import refuse_typed, typed
 from graspsense.cli.output import echo_json
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import detector_of
@@ -18,18 +18,14 @@ if TYPE_CHECKING:
     from graspsense.evaluation.events import EventScore, EventsEvaluation, LabelledEvents
     from graspsense.recording.replayable import Recording
 
-_FOR_LABELS: Final = (
-    *("png", "report", "keep", "checkpoints", "classifier", "target", "target_value"),
-    *("label", "instance", "order", "features", "before", "unreliable"),
-    *("objects", "instances", "trials", "states_per_instance", "pipeline", "gripper"),
-)
+_FOR_EVENTS: Final = ("source", "events", "tolerance", "folds", "only", "options", "seed", "force", "as_json")
 
 
 def evaluate_events(
     source: str, tolerance_s: float, folds: int, as_json: bool, given: Mapping[str, Any]
 ) -> None:
     """Score the events, and print how well each kind is told."""
-    refuse_typed(_FOR_LABELS, "has no meaning with --events")
+    refuse_typed({*typed()}.difference(_FOR_EVENTS), "has no meaning with --events")
     evaluation = _evaluated(source, tolerance_s, folds, given)
     if as_json:
         echo_json(to_json(evaluation))

@@ -82,8 +82,8 @@ def identify(
     from graspsense.sources.squeezes import recorded_squeezes
 
     check_outputs(out, page, overwrite=overwrite, sources=sources)
-    flags = [Flag("--gripper", "gripper.type", gripper)] if gripper else []
-    settings = resolve(pipeline, options=options, flags=flags, force=force)
+    flag = Flag("--gripper", "gripper.type", gripper)
+    settings = resolve(pipeline, options=options, flags=[flag], force=force)
     identifier = installed().resource(IdentifierEntry, settings.gripper.component.name)
     squeezes = recorded_squeezes(sources, name)
     with ProgressLine() as progress:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -89,14 +89,11 @@ def import_(
     suggest: str | None,
     plot: str | None,
     label: str | None,
-    time: str | None,
-    gap: str | None,
     forces: tuple[str, ...],
-    effort: str | None,
-    velocity: str | None,
     pipeline: str,
     options: tuple[str, ...],
     as_json: bool,
+    **named: str | None,
 ) -> None:
     """Import recorded grasps as trials, each with its recording, features and label.
 
@@ -108,7 +105,8 @@ def import_(
     if suggest is not None:
         suggest_manifest(sources, suggest)
         return
-    given = _columns({"time": time, "gap": gap, "effort": effort, "velocity": velocity}, forces)
+    given = {what: [text] for what, text in named.items() if text is not None}
+    given |= {"force": list(forces)} if forces else {}
     for source in sources:
         if given and not is_csv(source):
             raise click.UsageError(f"--{next(iter(given))} is for a CSV; {source} is none")
@@ -139,12 +137,6 @@ def import_(
     if unreadable:
         _echo_unreadable(unreadable)
         click.get_current_context().exit(DataDamaged.exit_code)
-
-
-def _columns(named: Mapping[str, str | None], forces: Sequence[str]) -> dict[str, list[str]]:
-    """Return the expressions of a CSV by quantity."""
-    given = {what: [text] for what, text in named.items() if text is not None}
-    return {**given, "force": list(forces)} if forces else given
 
 
 class _Chosen:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import click
 
+from graspsense.cli.options import option_group
 from graspsense.cli.terminal import talk, warn
 from graspsense.core.components.entries import LiveObserverEntry
 from graspsense.core.components.registry import installed
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
     from graspsense.core.values.trial import Trial
     from graspsense.live.feeds import LiveFeed
 
-_Command = TypeVar("_Command", bound=Callable[..., Any])
 EXTRAS: Final = {
     "--live": ("websockets",),
     "--foxglove": ("foxglove", "websockets"),
@@ -50,33 +50,32 @@ class LiveOptions(NamedTuple):
         return self.live or self.live_address is not None
 
 
-def live_options(command: _Command) -> _Command:
-    """Add `--live` and `--live-address` to a command."""
-    command = click.option(
+live_options = option_group(
+    click.option("--live", is_flag=True, help="Show the progress on a page in the browser."),
+    click.option(
         "--live-address",
         metavar="HOST[:PORT]",
         help="Serve the page of --live on this address or port, instead of on loopback.",
-    )(command)
-    return click.option("--live", is_flag=True, help="Show the progress on a page in the browser.")(command)
-
-
-def viewer_options(command: _Command) -> _Command:
-    """Add `--foxglove` and `--rerun` to a command with `live_options` that grasps."""
-    command = click.option(
-        "--rerun",
-        is_flag=False,
-        flag_value=RERUN_VIEWER,
-        metavar="[FILE.rrd]",
-        help="Log the grasp to a file of Rerun, or to a Rerun viewer that is running.",
-    )(command)
-    return click.option(
+    ),
+)
+viewer_options = option_group(
+    click.option(
         "--foxglove",
         is_flag=False,
         flag_value=0,
         type=click.IntRange(0, 65535),
         metavar="[PORT]",
         help="Stream the grasp to Foxglove.",
-    )(command)
+    ),
+    click.option(
+        "--rerun",
+        is_flag=False,
+        flag_value=RERUN_VIEWER,
+        metavar="[FILE.rrd]",
+        help="Log the grasp to a file of Rerun, or to a Rerun viewer that is running.",
+    ),
+)
+"""For a command with `live_options` that grasps."""
 
 
 class Live:

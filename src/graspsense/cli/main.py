@@ -72,8 +72,7 @@ class Commands(click.Group):
         """Return a command. Raises UnknownName, PluginUnavailable."""
         if cmd_name in COMMANDS:
             module, _, name = COMMANDS[cmd_name][0].partition(":")
-            command: click.Command = getattr(import_module(module), name)
-            return command
+            return _with_full_texts(getattr(import_module(module), name))
         return None if ctx.resilient_parsing or cmd_name.startswith("-") else _plugin_command(cmd_name)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -91,6 +90,26 @@ class Commands(click.Group):
             if name.startswith(incomplete)
         ]
         return [*commands, *click.Command.shell_complete(self, ctx, incomplete)]
+
+
+class FullText(click.types.StringParamType):
+    """The text of an option that is not empty, as it is where a variable of the shell is not set."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the text, or refuse it."""
+        if not str(value).strip():
+            self.fail("it is empty: give a value, or leave the option out", param, ctx)
+        return super().convert(value, param, ctx)
+
+
+def _with_full_texts(command: click.Command) -> click.Command:
+    """Return a command whose options, also those of its subcommands, take no empty text unless that is the default."""
+    for param in command.params:
+        if isinstance(param, click.Option) and param.type is click.STRING and param.default != "":
+            param.type = FullText()
+    for below in getattr(command, "commands", {}).values():
+        _with_full_texts(below)
+    return command
 
 
 def _plugin_command(name: str) -> click.Command:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Any, Final, TypeVar
 
 import click
@@ -35,6 +35,17 @@ class Seconds(click.FloatRange):
         return seconds
 
 
+def option_group(*options: Callable[[Any], Any]) -> Callable[[CommandT], CommandT]:
+    """Return the decorator that adds these options, in their order."""
+
+    def add(command: CommandT) -> CommandT:
+        for option in reversed(options):
+            command = option(command)
+        return command
+
+    return add
+
+
 def keys_option(
     text: str, metavar: str = "TABLE.KEY=VALUE", *, required: bool = False
 ) -> Callable[[CommandT], CommandT]:
@@ -55,14 +66,8 @@ def pipeline_option(text: str, default: str | None = DEFAULT_PIPELINE) -> Callab
     return click.option("--pipeline", metavar="NAME|FILE", default=default, help=text)
 
 
-def force_option(command: CommandT) -> CommandT:
-    """Add --force, which accepts settings outside of their plausible ranges."""
-    return click.option("--force", is_flag=True, help="Accept settings outside of their plausible range.")(
-        command
-    )
-
-
-_OPTIONS: Final = (
+force_option = click.option("--force", is_flag=True, help="Accept settings outside of their plausible range.")
+pipeline_options = option_group(
     pipeline_option(f"Name of a pipeline, or a .toml file.  [default: {DEFAULT_PIPELINE}]", default=None),
     click.option("--gripper", metavar="NAME", help="Gripper: sim, pr2, replay, ... (gripper.type)"),
     click.option(
@@ -75,16 +80,7 @@ _OPTIONS: Final = (
     click.option("--seed", type=int, help="Seed of all random numbers. (run.seed)"),
     force_option,
 )
-
-
-def plot_option(command: CommandT) -> CommandT:
-    """Add --plot, the picture of a grasp; it is refused before the grasp if it cannot be drawn or written."""
-    return click.option(
-        "--plot",
-        metavar="FILE.png",
-        callback=_picture_to_write,
-        help="Draw the grasp: forces, gap, phases, features, prediction.",
-    )(command)
+"""The options whose values are what `settings_of` takes."""
 
 
 def _picture_to_write(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
@@ -93,11 +89,13 @@ def _picture_to_write(ctx: click.Context, param: click.Parameter, value: str | N
     return file_to_write_as(".png")(ctx, param, value)
 
 
-def pipeline_options(command: CommandT) -> CommandT:
-    """Add --pipeline, --gripper, --object, -o, --seed and --force; their values are what `settings_of` takes."""
-    for option in reversed(_OPTIONS):
-        command = option(command)
-    return command
+plot_option = click.option(
+    "--plot",
+    metavar="FILE.png",
+    callback=_picture_to_write,
+    help="Draw the grasp: forces, gap, phases, features, prediction.",
+)
+"""The picture of a grasp, which is refused before the grasp if it cannot be drawn or written."""
 
 
 def sets_key(options: Sequence[str], key: str) -> bool:
@@ -122,7 +120,7 @@ def dashed(name: str) -> str:
     return f"--{name.replace('_', '-')}"
 
 
-def refuse_typed(names: Sequence[str], why: str) -> None:
+def refuse_typed(names: Collection[str], why: str) -> None:
     """Raise UsageError for an option among these that the user has typed: `--png` and why not."""
     for name in typed():
         if name in names:
@@ -155,6 +153,6 @@ def settings_of(
     return resolve(
         pipeline if pipeline is not None else DEFAULT_PIPELINE,
         options=options,
-        flags=[flag for flag in flags if flag.value is not None],
+        flags=flags,
         force=force,
     )

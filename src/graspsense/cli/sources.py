@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, TypeVar
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
@@ -14,6 +14,7 @@ from graspsense.cli.options import (
     dashed,
     force_option,
     keys_option,
+    option_group,
     pipeline_option,
     refuse_typed,
     typed,
@@ -34,8 +35,6 @@ if TYPE_CHECKING:
     from graspsense.core.learn.labelled import Labelled
     from graspsense.core.values.features import FeatureTable
 
-CommandT = TypeVar("CommandT", bound=Callable[..., Any])
-
 SIMULATED: Final = "simulated"
 DEFAULT_CLASSIFIER: Final = "c45"
 
@@ -51,7 +50,7 @@ SOURCES: Final = """\b
                    `graspsense identify` has identified
     """
 
-_OPTIONS: Final = (
+source_options = option_group(
     click.option("--label", metavar="COLUMN", help="CSV: column of the label."),
     click.option(
         "--instance",
@@ -106,22 +105,10 @@ _OPTIONS: Final = (
     click.option("--seed", type=SEED, default=0, show_default=True, help="Seed of all random numbers."),
     force_option,
 )
+"""The options that say where trials come from; they arrive as keywords for `trials_of`."""
 
-_ONLY_FOR: Final = {
-    "CSV": ("label", "instance", "order", "features", "before"),
-    "data set": ("unreliable",),
-    SIMULATED: (
-        "objects",
-        "instances",
-        "trials",
-        "states_per_instance",
-        "calibration_instances",
-        "pipeline",
-        "gripper",
-    ),
-}
-
-
+_SIMULATED_TOO: Final = ("calibration_instances", "pipeline", "gripper")
+"""Options for simulated trials that are no keys of `TrialSource`."""
 _SAME_KEYS: Final = (
     *("only", "label", "instance", "order", "unreliable"),
     *("instances", "trials", "states_per_instance"),
@@ -129,26 +116,28 @@ _SAME_KEYS: Final = (
 """Options that are keys of `TrialSource` as they are."""
 
 
-def source_options(command: CommandT) -> CommandT:
-    """Add the options that say where trials come from; they arrive as keywords for `trials_of`."""
-    for option in reversed(_OPTIONS):
-        command = option(command)
-    return command
-
-
-def classifier_option(command: CommandT) -> CommandT:
-    """Add --classifier."""
-    return click.option(
-        "--classifier",
-        metavar="NAME",
-        help="c45, svm, mlp, forest, extra-trees, boosted, ebm, knn, tree, or another. "
-        f"[{DEFAULT_CLASSIFIER}] (classifier.type)",
-    )(command)
-
-
-def source_argument(command: CommandT) -> CommandT:
-    """Add the argument SOURCE; the folder of a store needs no `store:`."""
-    return click.argument("source", callback=named_source)(command)
+classifier_option = click.option(
+    "--classifier",
+    metavar="NAME",
+    help="c45, svm, mlp, forest, extra-trees, boosted, ebm, knn, tree, or another. "
+    f"[{DEFAULT_CLASSIFIER}] (classifier.type)",
+)
+folds_option = click.option(
+    "--folds", type=click.IntRange(min=2), default=10, show_default=True, help="Number of folds."
+)
+keep_option = click.option(
+    "--keep",
+    metavar="FILE",
+    callback=file_to_write,
+    help="Write the features of all trials as a CSV file.",
+)
+"""The file that `keep_features` writes."""
+checkpoints_option = click.option(
+    "--checkpoints",
+    metavar="SECONDS",
+    help="Also predict so many seconds after the contact, comma-separated, as in 0.1,0.2,0.4.",
+)
+"""`checkpoints_of` reads its text."""
 
 
 def named_source(_ctx: click.Context, _param: click.Parameter, value: Any) -> Any:
@@ -156,26 +145,13 @@ def named_source(_ctx: click.Context, _param: click.Parameter, value: Any) -> An
     return tuple(map(as_source, value)) if isinstance(value, tuple) else as_source(value)
 
 
+source_argument = click.argument("source", callback=named_source)
+"""The argument SOURCE; the folder of a store needs no `store:`."""
+
+
 def named_store(_ctx: click.Context, _param: click.Parameter, value: str) -> str:
     """Callback of the argument for the folder of a store, which may be named as `store:DIR` as well."""
     return store_folder(value)
-
-
-def folds_option(command: CommandT) -> CommandT:
-    """Add --folds."""
-    return click.option(
-        "--folds", type=click.IntRange(min=2), default=10, show_default=True, help="Number of folds."
-    )(command)
-
-
-def keep_option(command: CommandT) -> CommandT:
-    """Add --keep, the file that `keep_features` writes."""
-    return click.option(
-        "--keep",
-        metavar="FILE",
-        callback=file_to_write,
-        help="Write the features of all trials as a CSV file.",
-    )(command)
 
 
 def keep_features(keep: str | None, labelled: Labelled) -> None:
@@ -184,15 +160,6 @@ def keep_features(keep: str | None, labelled: Labelled) -> None:
         from graspsense.sources.trial_table.features_csv import write_labelled
 
         write_labelled(Path(keep), labelled)
-
-
-def checkpoints_option(command: CommandT) -> CommandT:
-    """Add --checkpoints; `checkpoints_of` reads its text."""
-    return click.option(
-        "--checkpoints",
-        metavar="SECONDS",
-        help="Also predict so many seconds after the contact, comma-separated, as in 0.1,0.2,0.4.",
-    )(command)
 
 
 def is_csv(source: str) -> bool:
@@ -236,7 +203,10 @@ def trials_of(
         described = structured(values, TrialSource, source)
     except ValidationFailed as misfit:
         raise ConfigError(
-            "\n".join(f"{dashed(str(problem.path[0]))}: {problem.words()}" for problem in misfit.problems)
+            "\n".join(
+                f"{'SOURCE' if problem.path == ('source',) else dashed(str(problem.path[0]))}: {problem.words()}"
+                for problem in misfit.problems
+            )
         ) from None
     if kind == SIMULATED and folds is not None:
         from graspsense.evaluation.folds import check_folds
@@ -310,26 +280,26 @@ def command_line(without: Sequence[str], command: str = "") -> str:
 
 def _refuse_misplaced(kind: str) -> None:
     """Refuse options that say nothing about this kind of source. Raises UsageError."""
-    for owner, names in _ONLY_FOR.items():
+    from graspsense.sources.trial_source import KEYS_OF_KIND
+
+    for owner, keys in KEYS_OF_KIND.items():
         if owner != kind:
             why = f"is for a source of the kind {owner!r}; this one is of the kind {kind!r}"
-            if "features" in names:
+            if owner == "CSV":
                 refuse_typed(["features"], f"{why}: a feature set is selected by -o features.type=NAME")
-            refuse_typed(names, why)
+            refuse_typed((*keys, *(_SIMULATED_TOO if owner == SIMULATED else ())), why)
 
 
 def _settings(source: str, given: Mapping[str, Any], classifier: str | None) -> Settings:
     from graspsense.sources.identified import gripper_flags
 
-    flags = gripper_flags(source)
-    flags += [Flag("--gripper", "gripper.type", given["gripper"])] if given["gripper"] else []
-    if classifier:
-        flags.append(Flag("--classifier", "classifier.type", classifier))
+    flags = (
+        *gripper_flags(source),
+        Flag("--gripper", "gripper.type", given["gripper"]),
+        Flag("--classifier", "classifier.type", classifier),
+    )
     settings = resolve(given["pipeline"], options=given["options"], flags=flags, force=given["force"])
-    if settings.classifier is None:
-        flags.append(Flag("--classifier", "classifier.type", DEFAULT_CLASSIFIER))
-        settings = resolve(given["pipeline"], options=given["options"], flags=flags, force=given["force"])
-    return settings
+    return settings if settings.classifier else _settings(source, given, DEFAULT_CLASSIFIER)
 
 
 def _alone(table: str, name: str, given: Mapping[str, Any], source: str) -> SelectedComponent:

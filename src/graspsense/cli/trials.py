@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, TypeVar
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
@@ -20,8 +20,6 @@ from graspsense.store.labels import agrees, labels_of
 if TYPE_CHECKING:
     from graspsense.store.rows import StoredTrial
     from graspsense.store.store import Store
-
-CommandT = TypeVar("CommandT", bound=Callable[..., Any])
 
 HEADER: Final = ("TRIAL", "MADE", "LABEL", "INSTANCE", "OUTCOME", "GRIPPER", "STATE")
 

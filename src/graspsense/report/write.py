@@ -48,7 +48,7 @@ def require_writable(path: Path) -> None:
 
 def write_html(path: Path, page: Page) -> None:
     """Write a page, replacing an older one. Raises SaveFailed."""
-    write_or_replace(path, page.html().encode("utf-8"), make_folder=True)
+    write_or_replace(path, page.html().encode(errors="backslashreplace"), make_folder=True)
 
 
 def write_picture(path: Path, figure: Any, **how: Any) -> None:

@@ -15,7 +15,7 @@ from graspsense.core.learn.checkpoints import with_checkpoints
 from graspsense.core.learn.labelled import Labelled, rows_of_class
 from graspsense.core.settings.layers import KINDS, read_toml, toml_kind
 from graspsense.core.settings.resolved import Settings
-from graspsense.core.values.errors import ConfigError, PluginUnavailable
+from graspsense.core.values.errors import ConfigError, PluginUnavailable, suggestion
 from graspsense.core.values.label_text import alike_words, spelled_alike
 from graspsense.core.values.trace import Trace
 from graspsense.sources.identified import IDENTIFIED, gripper_flags, identified_scenes
@@ -66,7 +66,12 @@ class TrialSource(Group):
         return kind_of(self.source)
 
 
-_OF_CSV: Final = ("label", "instance", "order", "columns", "before")
+KEYS_OF_KIND: Final[Mapping[Kind, tuple[str, ...]]] = {
+    "simulated": (*fields_dict(Group), "groups"),
+    "CSV": ("label", "instance", "order", "columns", "before"),
+    "data set": ("unreliable",),
+}
+"""The keys of a source that are for one kind of it."""
 
 
 def tables_without_effect(source: TrialSource) -> tuple[str, ...]:
@@ -78,12 +83,7 @@ def tables_without_effect(source: TrialSource) -> tuple[str, ...]:
 
 def keys_without_effect(source: TrialSource) -> tuple[str, ...]:
     """Return the keys of a source that its trials do not depend on, because they are for another kind."""
-    of_kind = {
-        "simulated": (*fields_dict(Group), "groups"),
-        "CSV": _OF_CSV,
-        "data set": ("unreliable",),
-    }
-    return tuple(key for kind, keys in of_kind.items() if kind != source.kind for key in keys)
+    return tuple(key for kind, keys in KEYS_OF_KIND.items() if kind != source.kind for key in keys)
 
 
 def load_trials(
@@ -150,7 +150,7 @@ def kind_of(source: str) -> Kind:
     raise ConfigError(
         f"{source!r} is not a source of trials: name a FILE.csv, recordings as manifest:FILE.toml, a data set as "
         f"icub:FOLDER, a store as store:DIR, `{SIMULATED}`, or scenes of `graspsense identify` as "
-        f"{IDENTIFIED}cup.toml,mug.toml"
+        f"{IDENTIFIED}cup.toml,mug.toml.{suggestion(source, [SIMULATED])}"
     )
 
 

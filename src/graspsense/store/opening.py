@@ -98,7 +98,7 @@ def make_safe(connection: sqlite3.Connection) -> None:
 
 def connect_read_only(path: Path) -> sqlite3.Connection:
     """Return a read-only connection, to a copy in memory where the log of a writer cannot be read in its place."""
-    name = quote(str(path.absolute()))
+    name = quote(os.fsencode(path.absolute()))
     connection = sqlite3.connect(f"file:{name}?mode=ro", uri=True, timeout=BUSY_S, isolation_level=None)
     try:
         connection.execute("SELECT count(*) FROM sqlite_schema").fetchone()

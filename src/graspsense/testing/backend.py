@@ -16,7 +16,7 @@ from graspsense.core.components.strict import keys_of
 from graspsense.core.grasp.protection.effort_ceiling import MARGIN
 from graspsense.core.grasp.runner import Grasp, run_uninterrupted
 from graspsense.core.settings.selected import create
-from graspsense.core.values.errors import DeviceLost, NoDevice, RecordingEnded, TareRefused, named
+from graspsense.core.values.errors import DeviceLost, NoDevice, RecordingEnded, TareRefused
 from graspsense.core.values.signals import (
     FORCE,
     HOLD,
@@ -137,25 +137,17 @@ def pads_can_be_zeroed(subject: Subject) -> None:
 
 def closes_in_any_state(subject: Subject) -> None:
     """`close` works before `open`, after it, twice, and during a command; the gripper can then be opened again."""
-    backend = subject.create()
-    stage = "before open"
-    try:
+    backend, advice = subject.create(), ": `close` must release everything in any state"
+    with raises_nothing("close before open", advice):
         backend.close()
-        for attempt in ("the first", "the second"):
-            stage = f"after {attempt} opening"
-            with leaving_no_thread("it is opened") if attempt == "the second" else nullcontext():
-                info = description(backend.open(0))
-                _first_frame(backend)
-                backend.apply(info.relaxed)
-                backend.close()
-                stage = "for the second time"
-                backend.close()
-    except CheckFailed:
-        raise
-    except Exception as error:
-        raise CheckFailed(
-            f"{stage} it raised {named(error)}: `close` must release everything in any state"
-        ) from error
+    for attempt in ("first", "second"):
+        no_more = leaving_no_thread("it is opened") if attempt == "second" else nullcontext()
+        with no_more, raises_nothing(f"closed twice after the {attempt} opening, it", advice):
+            info = description(backend.open(0))
+            _first_frame(backend)
+            backend.apply(info.relaxed)
+            backend.close()
+            backend.close()
 
 
 def _first_frame(backend: SensorBackend[Any]) -> Frame:
@@ -220,6 +212,15 @@ def objects_can_be_grasped(subject: Subject) -> None:
     names = [name for kind in kinds for name in kind.full_names]
     twice = {name for name in names if names.count(name) > 1}
     demand(not twice, f"objects() gives {', '.join(sorted(twice))} twice: give each full name once")
+    held = set()
+    for name in names:
+        with raises_nothing(f"with_object({name!r})", ", although objects() gives that name"):
+            held.add(repr(subject.create().with_object(name).config))
+    demand(
+        len(held) == len(names),
+        f"with_object gives the same settings for several of {', '.join(names)}: take the name in, as in "
+        "`type(self)(attrs.evolve(self.config, object=name))`",
+    )
     for kind in kinds:
         name = kind.full_names[0]
         with (

@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import time
 from copy import deepcopy
+from math import nan
 from typing import Any, Final
 
 import numpy as np
@@ -14,7 +15,7 @@ from graspsense.core.components.compiled_features import columns_of_ticks, compi
 from graspsense.core.components.roles import FeatureSet
 from graspsense.core.values.features import Features
 from graspsense.core.values.signals import Phase
-from graspsense.core.values.trace import Trace
+from graspsense.core.values.trace import TICK_COLUMNS, Trace
 from graspsense.core.values.units import is_si
 from graspsense.testing.checks import demand, leaving_no_thread, raises_nothing
 from graspsense.testing.samples import (
@@ -132,6 +133,18 @@ def a_whole_grasp_has_features(subject: Subject) -> None:
     )
 
 
+def width_is_a_gap_of_the_grasp(subject: Subject) -> None:
+    """The feature that is the width of the object lies within the gaps of the grasp."""
+    trace, name = _whole(subject), subject.entry.width
+    width = nan if name is None else _features(subject, trace)[name]
+    low, high = float(trace.gap_m.min()), float(trace.gap_m.max())
+    demand(
+        width != width or low <= width <= high,
+        f"{name!r} is the width of the object, and {width:g} in a grasp with gaps from {low:g} to {high:g} m: give it "
+        "in metres, or leave `width=True` out",
+    )
+
+
 def handles_a_trace_that_ends_anywhere(subject: Subject) -> None:
     """`extract(trace.until(t))` works for every t, as early recognition needs it."""
     whole = _whole(subject)
@@ -181,16 +194,43 @@ def does_not_change_the_trace(subject: Subject) -> None:
 
 
 def requires_what_it_reads(subject: Subject) -> None:
-    """The channels in `requires` suffice: without the others, the features are the same."""
+    """The channels in `requires` suffice: without the others, the features are the same, whichever pad bears more."""
     required = {require.name for require in subject.entry.requires}
-    full = _features(subject, _whole(subject))
-    own = _features(subject, with_channels(_whole(subject), required), "a grasp")
     others = [name for name in COLUMNS_OF_CHANNEL if name not in required]
-    demand(
-        _same(full, own),
-        f"without the channels it does not declare ({', '.join(others)}) it gives {own.as_dict()} instead of "
-        f"{full.as_dict()}: add the channels that it reads to `requires`",
+    whole = _whole(subject)
+    turned = evolve(whole, force_left_n=whole.force_right_n, force_right_n=whole.force_left_n)
+    for trace in (whole, turned):
+        full, own = _features(subject, trace), _features(subject, with_channels(trace, required), "a grasp")
+        demand(
+            _same(full, own),
+            f"without the channels it does not declare ({', '.join(others)}) it gives {own.as_dict()} instead of "
+            f"{full.as_dict()}: add the channels that it reads to `requires`",
+        )
+
+
+def times_are_those_of_the_clock(subject: Subject) -> None:
+    """A feature in seconds, or per second, does not follow the number of ticks of the same time."""
+    whole = _whole(subject)
+    every, *others = (
+        _features(subject, _of_each(k, whole, subject), "a grasp with fewer ticks") for k in (1, 2, 4)
     )
+    for i, (name, unit, value) in enumerate(zip(every.names, every.units, every.values, strict=True)):
+        fewer = [features.values[i] for features in others]
+        counted = all(
+            min(abs(few - value / k), abs(few - value * k)) <= 0.03 * abs(few) and abs(few) > 1e-9
+            for k, few in zip((2, 4), fewer, strict=True)
+        )
+        demand(
+            not (counted and (unit == "s" or unit.endswith("/s"))),
+            f"feature {name!r} is {value:g} {unit}, and {fewer[0]:g} {unit} where half of the ticks are missing: take "
+            "times from `trace.t_s`, not from the number of ticks",
+        )
+
+
+def _of_each(k: int, trace: Trace, subject: Subject) -> Trace:
+    """Return the trace with each k-th of its ticks."""
+    fewer = evolve(trace, **{name: getattr(trace, name)[::k] for name in TICK_COLUMNS}, signals={})
+    return with_signals(fewer, subject.entry.requires)
 
 
 def independent_of_the_start_of_the_clock(subject: Subject) -> None:

@@ -1,6 +1,6 @@
 """Names for the arrays of this package: what they hold, and of which type.
 
-Rows of a table are called rows; a node of a tree is an index into the arrays of `splits.Splits`.
+Rows of a table are called rows; a node of a tree is an index into the arrays of `tree.Splits`.
 """
 
 from __future__ import annotations

@@ -23,23 +23,6 @@ _NEEDED = ("numba", "graspsense")
 """numba compiles; graspsense keeps the compiled code on disk, under a fingerprint of the code."""
 
 
-def choose_fast(engine: Engine, n_values: int) -> bool:
-    """Return whether to use compiled code for so many values.
-
-    "auto" does not where it cannot be compiled; see `missing_for_fast`.
-
-    Raises ValueError for an unknown engine, and ModuleNotFoundError where "fast" is not installed.
-    """
-    if engine not in get_args(Engine):
-        raise ValueError(f"engine is {engine!r}; allowed: {', '.join(get_args(Engine))}")
-    if engine == "fast" and missing_for_fast():
-        raise ModuleNotFoundError(
-            f"engine='fast' needs {' and '.join(missing_for_fast())}, which is not installed; "
-            "install graspsense-c45[fast] or use engine='plain'"
-        )
-    return engine == "fast" or (engine == "auto" and n_values >= WORTH_COMPILING and not missing_for_fast())
-
-
 class Fits:
     """The fits of this process, by which "auto" chooses the engine of the next one."""
 
@@ -50,14 +33,22 @@ class Fits:
     def choose_fast(self, engine: Engine, n_values: int, slim: bool) -> bool:
         """Return whether to fit a table of so many values by compiled code; slim: see `building.compiled`.
 
-        Raises as the function `choose_fast` does.
+        "auto" does not where it cannot be compiled; see `missing_for_fast`.
+
+        Raises ValueError for an unknown engine, and ModuleNotFoundError where "fast" is not installed.
         """
-        if choose_fast(engine, n_values):
-            return True
+        if engine not in get_args(Engine):
+            raise ValueError(f"engine is {engine!r}; allowed: {', '.join(get_args(Engine))}")
+        if engine == "fast" and missing_for_fast():
+            raise ModuleNotFoundError(
+                f"engine='fast' needs {' and '.join(missing_for_fast())}, which is not installed; "
+                "install graspsense-c45[fast] or use engine='plain'"
+            )
+        if engine != "auto" or missing_for_fast():
+            return engine == "fast"
         loading_s = 0.0 if "numba" in sys.modules else LOADING_S
-        if engine != "auto" or self._plain_s < loading_s or missing_for_fast():
-            return False
-        return self._plain_s >= COMPILING_S or self._is_kept(slim)
+        worth = n_values >= WORTH_COMPILING or self._plain_s >= max(COMPILING_S, loading_s)
+        return worth or (self._plain_s >= loading_s and self._is_kept(slim))
 
     def add_plain(self, seconds: float) -> None:
         """Count a tree that took the interpreter so much processor time."""

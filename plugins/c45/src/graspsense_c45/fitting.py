@@ -14,13 +14,13 @@ from attrs import evolve
 
 from graspsense_c45.arrays import Indices, Reals
 from graspsense_c45.building.builder import TreeBuilder
+from graspsense_c45.building.nodes import Nodes
 from graspsense_c45.criteria import GAP
 from graspsense_c45.engines import PARTS, Fits
 from graspsense_c45.options import J48, Engine, Options
-from graspsense_c45.splits import LEAF, GrowingTree
 from graspsense_c45.table import MISSING_CLASS, Table
 from graspsense_c45.training_set import make_training_set
-from graspsense_c45.tree import Tree, finish
+from graspsense_c45.tree import LEAF, Tree
 from graspsense_c45.weka_folds import hold_out
 
 _FITS = Fits()
@@ -65,7 +65,7 @@ def _fit_rows(
     began = time.thread_time()
     builder = TreeBuilder(training, compiled)
     if options.actual_split_value:
-        _use_actual_values(builder.tree, table.values)
+        _use_actual_values(builder.nodes, table.values)
     if options.pruning == "reduced_error":
         builder.prune_reduced_error(table, held_out)
     elif options.collapse:
@@ -74,21 +74,22 @@ def _fit_rows(
         builder.prune_pessimistic()
     if not compiled:
         _FITS.add_plain(time.thread_time() - began)
-    return finish(builder.tree, training.scale.weight_bits, table.schema, options.laplace)
+    return builder.finished(table.schema, options.laplace)
 
 
-def _use_actual_values(tree: GrowingTree, values: Reals) -> None:
+def _use_actual_values(nodes: Nodes, values: Reals) -> None:
     """Replace every midpoint by the largest value of its column that is not above it."""
-    for a in np.unique(tree.feature[tree.feature != LEAF]):
-        nodes = np.flatnonzero((tree.feature == a) & ~np.isnan(tree.threshold))
-        if nodes.size:
+    feature, threshold = map(np.asarray, (nodes.feature, nodes.threshold))
+    for a in np.unique(feature[feature != LEAF]):
+        cuts = np.flatnonzero((feature == a) & ~np.isnan(threshold))
+        if cuts.size:
             # NaN is sorted to the end, behind every threshold.
             column = np.sort(values[:, a])
-            actual = column[np.searchsorted(column, tree.threshold[nodes], side="right") - 1]
+            actual = column[np.searchsorted(column, threshold[cuts], side="right") - 1]
             if not actual.all():
                 # 0.0 and -0.0 are equal; J48 has the one that comes first in the rows.
                 actual[actual == 0.0] = values[np.argmax(values[:, a] == 0.0), a]
-            tree.threshold[nodes] = actual
+            threshold[cuts] = actual
 
 
 _GAPS = 100

@@ -7,9 +7,8 @@ from numpy.typing import ArrayLike
 
 from graspsense_c45.arithmetic import TOLERANCE
 from graspsense_c45.arrays import Indices, Reals
-from graspsense_c45.splits import LEAF, Splits
 from graspsense_c45.table import check_values
-from graspsense_c45.tree import Tree, largest_class
+from graspsense_c45.tree import LEAF, Splits, Tree, largest_class
 
 CHUNK = 16_384
 """Rows that are routed together: their arrays fit into the processor's caches."""
@@ -53,8 +52,7 @@ def node_distributions(tree: Tree, laplace: bool) -> Reals:
         of_nodes = (weights + 1.0) / (total + n_classes)[:, None]
     else:
         of_nodes = weights / np.where(total > 0, total, 1.0)[:, None]
-    empty = np.flatnonzero((total < TOLERANCE) & (tree.parent >= 0))
-    of_nodes[empty] = of_nodes[tree.parent[empty]]
+    of_nodes[tree.empty] = of_nodes[tree.parent[tree.empty]]
     return np.asarray(of_nodes)
 
 

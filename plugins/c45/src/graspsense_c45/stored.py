@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 
 from graspsense_c45.arrays import NodeColumn, Reals
-from graspsense_c45.splits import ALL_VALUES, LEAF, Splits
 from graspsense_c45.table import Attribute, Schema
-from graspsense_c45.tree import Tree, first_children
+from graspsense_c45.tree import ALL_VALUES, LEAF, Splits, Tree, first_children
 
 FORMAT = "graspsense-c45-tree"
 VERSION = 1
@@ -26,7 +25,7 @@ class StoredTreeError(ValueError):
 def to_document(tree: Tree) -> dict[str, Any]:
     """Return the tree as JSON values: its attributes, its classes, and its nodes in columns, breadth first.
 
-    The columns of the nodes are `feature`, `threshold`, `category` and `n_children` (see `splits.Splits`), and
+    The columns of the nodes are `feature`, `threshold`, `category` and `n_children` (see `tree.Splits`), and
     `class_weights` (see `tree.Tree`).
     """
     splits = tree.splits

@@ -14,7 +14,7 @@ def to_text(tree: Tree) -> str:
 
     With -B J48 prints all digits of a threshold; here thresholds have at most six decimals, as without -B.
     """
-    lines = [f": {_leaf(tree, 0, 0)}"] if tree.is_leaf(0) else ["", *_branches(tree)]
+    lines = [f": {_leaf(tree, 0)}"] if tree.is_leaf(0) else ["", *_branches(tree)]
     lines += ["", f"Number of Leaves  : \t{tree.n_leaves}", "", f"Size of the tree : \t{tree.node_count}", ""]
     return "\n".join(lines)
 
@@ -27,16 +27,14 @@ def _branches(tree: Tree) -> list[str]:
         child = tree.children(node)[slot]
         line = "|   " * depth + j48_branch(tree, node, slot)
         if tree.is_leaf(child):
-            line += f": {_leaf(tree, child, node)}"
+            line += f": {_leaf(tree, child)}"
         lines.append(line)
         stack += [(child, below, depth + 1) for below in reversed(range(len(tree.children(child))))]
     return lines
 
 
-def _leaf(tree: Tree, leaf: int, parent: int) -> str:
-    # A branch without training weight has the class of its parent.
-    weight = float(tree.weighted_n_node_samples[leaf])
-    majority = int(tree.majority_class[leaf if weight > TOLERANCE else parent])
+def _leaf(tree: Tree, leaf: int) -> str:
+    weight, majority = float(tree.weighted_n_node_samples[leaf]), int(tree.majority_class[leaf])
     errors = weight - float(tree.class_weights[leaf, majority])
     wrong = f"/{weka_weight(errors)}" if errors > TOLERANCE else ""
     return f"{label_text(tree, majority)} ({weka_weight(weight)}{wrong})"
@@ -100,10 +98,6 @@ def to_rules(tree: Tree) -> tuple[Rule, ...]:
 
 
 def _rule(tree: Tree, leaf: int, conditions: tuple[str, ...]) -> Rule:
-    support = float(tree.weighted_n_node_samples[leaf])
-    if support < TOLERANCE:
-        majority, probability = int(tree.majority_class[max(int(tree.parent[leaf]), 0)]), 0.0
-    else:
-        majority = int(tree.majority_class[leaf])
-        probability = float(tree.class_weights[leaf, majority]) / support
+    support, majority = float(tree.weighted_n_node_samples[leaf]), int(tree.majority_class[leaf])
+    probability = 0.0 if support < TOLERANCE else float(tree.class_weights[leaf, majority]) / support
     return Rule(conditions, tree.schema.classes[majority], support, probability)

@@ -1,4 +1,4 @@
-"""A fitted tree, as a value."""
+"""A fitted tree, as a value: its nodes in flat arrays, of which the children of a node have consecutive indices."""
 
 from __future__ import annotations
 
@@ -6,12 +6,65 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from attrs import frozen
+from attrs import define, frozen
 
 from graspsense_c45.arithmetic import LN2, TOLERANCE, x_ln_x
-from graspsense_c45.arrays import AnyArray, Indices, Reals
-from graspsense_c45.splits import LEAF, ROOT, GrowingTree, Splits
+from graspsense_c45.arrays import AnyArray, Indices, NodeColumn, Reals
 from graspsense_c45.table import Attribute, Schema
+
+LEAF = -1
+"""The feature of a leaf."""
+ALL_VALUES = -1
+"""The category of a nominal split with one child for each value, and of every other node."""
+ROOT = np.zeros(1, dtype=np.int64)
+"""The root as an array of nodes."""
+
+
+@define(eq=False)
+class Splits:
+    """How the nodes of a tree split, one entry per node; node 0 is the root.
+
+    feature: the attribute that is tested, -1 at a leaf.
+    threshold: of a numeric test, in the unit of the attribute; a value at most this large goes to the first child. NaN
+        at other nodes.
+    category: of a nominal test of one value against the others, the index of the value that goes to the first child;
+        -1 where each value has a child of its own, and at other nodes.
+    first_child, n_children: the children are ``first_child`` to ``first_child + n_children - 1``.
+    """
+
+    feature: NodeColumn
+    threshold: Reals
+    category: NodeColumn
+    first_child: NodeColumn
+    n_children: NodeColumn
+
+    def children(self, nodes: Indices) -> Indices:
+        """Return all children of these nodes, in the order of the nodes."""
+        return ranges(self.first_child[nodes], self.n_children[nodes])
+
+    def levels(self, roots: Indices) -> list[Indices]:
+        """Return the nodes at depth 0, 1, ... below these roots."""
+        levels = []
+        nodes = roots
+        while nodes.size:
+            levels.append(nodes)
+            nodes = self.children(nodes)
+        return levels
+
+    def slot(self, nodes: Indices, tested: Reals) -> Indices:
+        """Return the child that each value goes to, counted from 0; -1 where the value is missing.
+
+        `tested` holds, for each of the nodes, a value of the node's feature.
+        """
+        nominal = np.isnan(self.threshold[nodes])
+        slots = (tested > self.threshold[nodes]).astype(np.int64)
+        if nominal.any():
+            with np.errstate(invalid="ignore"):
+                code = tested[nominal].astype(np.int64)
+            category = self.category[nodes][nominal]
+            slots[nominal] = np.where(category == ALL_VALUES, code, code != category)
+        slots[np.isnan(tested)] = -1
+        return slots
 
 
 @frozen(eq=False, repr=False, slots=False)
@@ -79,8 +132,18 @@ class Tree:
 
     @cached_property
     def majority_class(self) -> Indices:
-        """The class of each node: the first one that no other exceeds by more than the tolerance."""
-        return largest_class(self.class_weights)
+        """The class of each node: the first one that no other exceeds by more than the tolerance.
+
+        A leaf without training weight has that of its parent.
+        """
+        chosen = largest_class(self.class_weights)
+        chosen[self.empty] = chosen[self.parent[self.empty]]
+        return chosen
+
+    @cached_property
+    def empty(self) -> Indices:
+        """The leaves without training weight, as of a nominal value that no row has."""
+        return np.flatnonzero((self.weighted_n_node_samples < TOLERANCE) & (self.parent >= 0))
 
     @cached_property
     def parent(self) -> Indices:
@@ -149,18 +212,14 @@ def largest_class(rows: Reals) -> Indices:
     return chosen
 
 
-def finish(grown: GrowingTree, weight_bits: int, schema: Schema, laplace: bool) -> Tree:
-    """Return the tree that was grown and pruned, without the nodes that are no longer reached."""
-    order = np.concatenate(grown.levels(ROOT))
-    n_children = grown.n_children[order].astype(np.int32)
-    splits = Splits(
-        grown.feature[order].astype(np.int32),
-        grown.threshold[order],
-        grown.category[order].astype(np.int32),
-        first_children(n_children),
-        n_children,
-    )
-    return Tree(schema, splits, np.ldexp(grown.counts[order].astype(np.float64), -weight_bits), laplace)
+def ranges(starts: AnyArray, lengths: AnyArray) -> Indices:
+    """Return the integers of several ranges, one range after the other."""
+    ends = lengths.cumsum(dtype=np.int64)
+    if not ends.size:
+        return ends
+    result: Indices = (starts + lengths - ends).repeat(lengths)
+    result += np.arange(ends[-1])
+    return result
 
 
 def first_children(n_children: AnyArray) -> AnyArray:

@@ -393,7 +393,7 @@ class _Grasp:
             self.last = frame
             if self.first_t_s is None:
                 self.first_t_s = frame.t_s
-            acted = self._acted(state)
+            acted, earlier = self._acted(state), state.phase
             command, state = advance(params, state, reading)
             self.state = state = self._not_yet_at_rest(state)
             stepped, same_phase = phase != TARING, state.phase == phase
@@ -403,7 +403,7 @@ class _Grasp:
             if not same_phase:
                 if phase == TARING and not self._tared(images, frame):
                     return
-                self.state = state = self._known(phase, state, frame)
+                self.state = state = self._known(earlier, state, frame)
                 phase, newest = state.phase, pads.counter
                 self._event(frame.t_s, Phase(phase), Phase(phase).name.lower())
             if state.guard is not watcher:

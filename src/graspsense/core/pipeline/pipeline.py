@@ -157,7 +157,7 @@ class Pipeline:
                 self.settings.pipeline,
                 plugins=self.plugins,
                 options=self.options,
-                flags=[flag for flag in flags if flag.value is not None],
+                flags=flags,
                 force=True,  # these settings have been accepted
             )
         else:

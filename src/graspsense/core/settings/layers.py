@@ -17,8 +17,15 @@ from graspsense.core.components.caller import set_option
 from graspsense.core.components.entries import TABLE_OF_ROLE, PipelineEntry
 from graspsense.core.components.registry import Plugins
 from graspsense.core.components.strict import InvalidValue, shown
-from graspsense.core.files.toml_file import labelled_values, settings_text
-from graspsense.core.files.toml_text import KeyPath, TomlError, key_lines, key_parts, toml_values
+from graspsense.core.files.toml_text import (
+    KeyPath,
+    TomlError,
+    key_lines,
+    key_parts,
+    labelled_values,
+    settings_text,
+    toml_values,
+)
 from graspsense.core.values.errors import ConfigError, UnknownName
 
 
@@ -130,7 +137,7 @@ class Layer:
 
 @frozen
 class Flag:
-    """A command-line flag that sets one key: `Flag("--gripper", "gripper.type", "pr2")`."""
+    """A command-line flag that sets one key: `Flag("--gripper", "gripper.type", "pr2")`; None is one not given."""
 
     name: str
     key: str

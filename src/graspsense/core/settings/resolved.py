@@ -114,7 +114,7 @@ def resolve(
         layers.append(experiment)
     typed, complaints = option_layers(options)
     layers += typed
-    layers += [flag.layer() for flag in flags]
+    layers += [flag.layer() for flag in flags if flag.value is not None]
     return _resolved_layers(pipeline, layers, complaints, plugins, force=force)
 
 
@@ -175,7 +175,7 @@ def _resolved_layers(
             continue
         if not force:
             doubted = (value for value in implausible_values(config) if value.path[0] not in followed)
-            doubts += _lines(merged, [value.under(table) for value in doubted])
+            doubts += [_in_a_line(merged.owner_of((table, *v.path)), v.under(table)) for v in doubted]
         if component is None:
             run = config
             values[table] = plain(config)
@@ -199,10 +199,6 @@ def _resolved_layers(
         values=values,
         origins=origins,
     )
-
-
-def _lines(merged: Merged, values: Sequence[InvalidValue]) -> list[str]:
-    return [_in_a_line(merged.owner_of(value.path), value) for value in values]
 
 
 _Complaint = str | tuple[Layer | None, InvalidValue]
@@ -303,9 +299,8 @@ def _tables_only(layer: Layer, complaints: list[_Complaint]) -> Layer:
             path = typed_path(layer) if layer.typed else (key,)
             complaints.append((layer, InvalidValue(path, f"a pipeline has no table {key!r}.", _TABLES)))
         elif not isinstance(value, Mapping):
-            advice = (
-                f": write {key}.type = {toml_value(value)}" if isinstance(value, str) and key != "run" else ""
-            )
+            name = isinstance(value, str) and key != "run"
+            advice = f": write {key}.type = {toml_value(value)}" if name else f": set a key of it, {key}.KEY"
             complaints.append(
                 layer.complain(InvalidValue((key,), f"expected a table, found {shown(value)}{advice}"))
             )

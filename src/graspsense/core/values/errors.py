@@ -157,12 +157,13 @@ def _is_of_a_plugin(path: Path) -> bool:
 
 
 def suggestion(word: str, allowed: Iterable[str]) -> str:
-    """Return `" Did you mean 'x'?"` for the nearest allowed name, or an empty string."""
+    """Return `" Did you mean 'x'?"` for the nearest allowed name, in any case, or an empty string."""
     if len(word) > _LONGEST_NAME:
         return ""
     comparable = sorted(islice((name for name in allowed if len(name) <= _LONGEST_NAME), _MOST_COMPARED))
-    near = get_close_matches(word, comparable, n=1, cutoff=0.5)
-    return f" Did you mean {near[0]!r}?" if near else ""
+    folded = {name.casefold(): name for name in comparable}
+    near = get_close_matches(word.casefold(), folded, n=1, cutoff=0.5)
+    return f" Did you mean {folded[near[0]]!r}?" if near else ""
 
 
 def counted(count: int, single: str, several: str = "") -> str:

@@ -14,29 +14,28 @@ from graspsense_c45.building.dealing import Deal, Entries
 from graspsense_c45.building.descent import Descent, Rows
 from graspsense_c45.building.nodes import Nodes
 from graspsense_c45.estimates import prepare_estimation
-from graspsense_c45.splits import ALL_VALUES, LEAF, GrowingTree
-from graspsense_c45.table import Table
+from graspsense_c45.table import Schema, Table
 from graspsense_c45.training_set import TrainingSet
+from graspsense_c45.tree import ALL_VALUES, LEAF, ROOT, Splits, Tree, first_children
 
 _ROOM = 64
 """Nodes and entries that there is room for beside those of the rows."""
 
 
 class TreeBuilder:
-    """Grows a tree when it is made, and prunes it on request. tree: as it is now."""
+    """Grows a tree when it is made, and prunes it on request. nodes: as they are now, arrays in `Nodes`."""
 
     def __init__(self, training: TrainingSet, compiled: bool) -> None:
         self._training, self._compiled = training, compiled
-        self._nodes = self._grown()
-        self.tree = GrowingTree(**self._nodes._asdict())
+        self.nodes: Any = self._grown()
 
     def collapse(self) -> None:
         """Make leaves of subtrees that hardly save training errors."""
         training = self._training
         self._call(
             pruning.collapse,
-            self._nodes,
-            _zeros(len(self.tree.feature)),
+            self.nodes,
+            _zeros(len(self.nodes.feature)),
             training.weight_margin,
             training.collapse_slack,
         )
@@ -44,7 +43,7 @@ class TreeBuilder:
     def prune_pessimistic(self) -> None:
         """Prune by estimated errors, after collapsing if at all."""
         training, options = self._training, self._training.options
-        weight_bits, n_nodes = training.scale.weight_bits, len(self.tree.feature)
+        weight_bits, n_nodes = training.scale.weight_bits, len(self.nodes.feature)
         constants = pruning.Pruning(
             prepare_estimation(options.confidence_factor, training.total_weight, weight_bits),
             training.weight_margin,
@@ -63,11 +62,25 @@ class TreeBuilder:
             weight_bits=training.scale.weight_bits,
             margin=training.weight_margin,
             limit=float(np.ldexp(TOLERANCE, min(bits, 80))),
-            counts=np.zeros(self.tree.counts.shape, dtype=np.int64),
-            as_tree=_zeros(len(self.tree.feature)),
+            counts=np.zeros(self.nodes.counts.shape, dtype=np.int64),
+            as_tree=_zeros(len(self.nodes.feature)),
         )
         rows = _rows(table.values[held_out], table.labels[held_out], weights)
-        self._send_down(reduced_error.prune_reduced_error, rows, (errors,), self.tree.counts.sum(axis=1))
+        self._send_down(reduced_error.prune_reduced_error, rows, (errors,), self.nodes.counts.sum(axis=1))
+
+    def finished(self, schema: Schema, laplace: bool) -> Tree:
+        """Return the tree without the nodes that are no longer reached, numbered breadth first."""
+        order = np.concatenate(Splits(*self.nodes[:-1]).levels(ROOT))
+        feature, threshold, category, _, n_children, counts = (column[order] for column in self.nodes)
+        splits = Splits(
+            feature.astype(np.int32),
+            threshold,
+            category.astype(np.int32),
+            first_children(n_children),
+            n_children.astype(np.int32),
+        )
+        weights = np.ldexp(counts.astype(np.float64), -self._training.scale.weight_bits)
+        return Tree(schema, splits, weights, laplace)
 
     def _grown(self) -> Nodes:
         """Return the nodes of the unpruned tree."""
@@ -86,7 +99,7 @@ class TreeBuilder:
         self, prune: Callable[..., bool], rows: Rows, others: tuple[Any, ...], known: FixedPoint | None
     ) -> None:
         """Prune by rows that are sent down; known: see `descent.Descent`, None where it is not given."""
-        nodes, n_nodes = self._nodes, len(self.tree.feature)
+        nodes, n_nodes = self.nodes, len(self.nodes.feature)
         unpruned = [np.copy(column) for column in nodes]
         n_entries = 4 * len(rows.labels) + _ROOM
         while True:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from graspsense_c45.arithmetic import TOLERANCE
 from graspsense_c45.arrays import Integers, IntegerTable, Numbers, NumberTable
-from graspsense_c45.splits import ALL_VALUES
+from graspsense_c45.tree import ALL_VALUES
 
 
 class Entries(NamedTuple):

@@ -11,7 +11,7 @@ from typing import NamedTuple
 from graspsense_c45.arrays import Integers, NumberTable, Truths
 from graspsense_c45.building.dealing import share_of
 from graspsense_c45.building.nodes import Nodes
-from graspsense_c45.splits import ALL_VALUES
+from graspsense_c45.tree import ALL_VALUES
 
 
 class Rows(NamedTuple):
@@ -141,7 +141,7 @@ def has_room(node: int, descent: Descent) -> bool:
 
 
 def slot_of(value: float, threshold: float, category: int) -> int:
-    """Return the child that a value goes to, counted from 0; see `splits.Splits`."""
+    """Return the child that a value goes to, counted from 0; see `tree.Splits`."""
     if threshold == threshold:
         return 1 if value > threshold else 0
     if category == ALL_VALUES:

@@ -8,11 +8,14 @@ import numpy as np
 
 from graspsense_c45.arithmetic import first_maximum
 from graspsense_c45.arrays import Integers, IntegerTable, Numbers
-from graspsense_c45.splits import ALL_VALUES, LEAF
+from graspsense_c45.tree import ALL_VALUES, LEAF
 
 
 class Nodes(NamedTuple):
-    """The nodes of a tree; see `splits.GrowingTree`."""
+    """The nodes of a tree while it is grown and pruned; see `tree.Splits`.
+
+    counts: nodes x classes, the fixed-point weight at each node.
+    """
 
     feature: Integers
     threshold: Numbers

@@ -8,7 +8,7 @@ from graspsense_c45.arithmetic import TOLERANCE, Scale, real_term, real_weight, 
 from graspsense_c45.arrays import Integers, IntegerTable
 from graspsense_c45.building.nodes import weight_of
 from graspsense_c45.criteria import gain, gain_ratio
-from graspsense_c45.splits import ALL_VALUES
+from graspsense_c45.tree import ALL_VALUES
 
 
 class Values(NamedTuple):

@@ -17,7 +17,7 @@ from graspsense import __version__
 from graspsense.core.components.firstparty import BUILTIN_MODULE, DISTRIBUTION
 from graspsense.core.components.hookspecs import ENTRY_POINT_GROUP
 from graspsense.core.components.registry.parts import canonical
-from graspsense.core.files.toml_file import labelled_values, settings_text
+from graspsense.core.files.toml_text import labelled_values, settings_text
 from graspsense.core.files.user_folders import NOWHERE, config_folder
 from graspsense.core.files.whole_file import write_whole
 from graspsense.core.values.errors import ConfigError, suggestion
