@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -31,7 +32,7 @@ def show_files(sources: Sequence[str], picture: str, as_json: bool) -> bool:
     if not all(map(is_plain_file, sources)):
         return False
     try:
-        files = [understood_file(Path(source).expanduser()) for source in sources]
+        files = [understood_file(Path(os.path.expanduser(source))) for source in sources]
     except GraspsenseError:
         return False
     if as_json:
@@ -54,7 +55,7 @@ def suggest_manifest(sources: Sequence[str], name: str) -> None:
 
     if len(sources) != 1:
         raise click.UsageError("--suggest is for one folder with recordings")
-    path, folder = Path(name).expanduser(), Path(sources[0]).expanduser()
+    path, folder = Path(os.path.expanduser(name)), Path(os.path.expanduser(sources[0]))
     if path.suffix != ".toml":
         raise click.UsageError(f"--suggest {name}: a manifest is a file FILE.toml")
     suggested = suggested_manifest(folder, path.parent)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -57,7 +58,7 @@ def _settings(recording: str, pipeline: str | None, options: tuple[str, ...], fo
     kind, name = kind_and_name(recording)
     kinds = known_kinds()
     folder, number, _ = recording.rpartition("#")
-    if kind not in kinds and number and (not kind or Path(folder).expanduser().is_dir()):
+    if kind not in kinds and number and (not kind or Path(os.path.expanduser(folder)).is_dir()):
         kind, name = "store", recording
     own: Any = None
     if pipeline is None and kind in ("store", "mcap"):

@@ -5,6 +5,7 @@ Files are not trusted: lengths are bounded, checksums are verified, and nothing 
 
 from __future__ import annotations
 
+import os
 import struct
 from collections.abc import Iterator
 from pathlib import Path
@@ -58,7 +59,7 @@ def read_recorded(path: str | Path, *, salvage: bool = False) -> RecordedGrasp:
     DataDamaged. Raises ConfigError if the file cannot be opened or is of another kind, TooLarge if it unpacks to more
     than is allowed.
     """
-    path = Path(path).expanduser()
+    path = Path(os.path.expanduser(path))
     reading = _PartialGrasp(path)
     with readable(f"the recording {path}"):
         refuse_devices(path)

@@ -5,6 +5,7 @@ Instances and placements are drawn from the identified spreads. The label of a t
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
@@ -60,7 +61,7 @@ def gripper_flags(source: str) -> list[Flag]:
 
 
 def _scene(name: str) -> IdentifiedScene:
-    path = Path(name).expanduser()
+    path = Path(os.path.expanduser(name))
     if not path.exists():
         raise ConfigError(f"there is no scene {name}")
     table = read_toml(path, name, "scene").values

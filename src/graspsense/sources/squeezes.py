@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -57,12 +58,12 @@ def recorded_squeezes(sources: Sequence[str], name: str | None = None) -> tuple[
 def _of_source(source: str) -> Iterator[RecordedSqueeze]:
     source = as_source(source)
     folder, number = place_and_number(source.removeprefix(STORE))
-    if source.startswith(STORE) or (number is not None and Path(folder).expanduser().is_dir()):
+    if source.startswith(STORE) or (number is not None and Path(os.path.expanduser(folder)).is_dir()):
         yield from _of_store(folder, number)
     elif source.endswith(".mcap"):
         from graspsense.recording.reader import read_recorded
 
-        path = Path(source).expanduser()
+        path = Path(os.path.expanduser(source))
         grasp = read_recorded(path)
         yield _of_grasp(grasp, grasp.record(), path.name, hashlib.sha256(path.read_bytes()).hexdigest())
     else:

@@ -24,7 +24,7 @@ def export(grasps: Sequence[StoredGrasp], place: str) -> dict[str, int]:
     folder, options = folder_and_options(place)
     with _new_folder(folder) as part:
         if options.annotate:
-            return annotate(grasps, Path(options.annotate).expanduser(), part)
+            return annotate(grasps, Path(os.path.expanduser(options.annotate)), part)
         return write_data_set(grasps, options.fps, part)
 
 

@@ -5,6 +5,7 @@ FOLDER?gap_m_per_unit=0.0008&fps=30&repeated=drop
 
 from __future__ import annotations
 
+import os
 from contextlib import suppress
 from math import inf
 from pathlib import Path
@@ -52,7 +53,7 @@ _NUMBERS: Final = ("gap_m_per_unit", "gap_zero", "force_n_per_unit", "fps")
 
 def folder_and_options(place: str) -> tuple[Path, PlaceOptions]:
     """Return the folder and the options that a place names. Raises ConfigError."""
-    whole = Path(place).expanduser()
+    whole = Path(os.path.expanduser(place))
     folder, mark, query = place.partition("?")
     if not mark or whole.is_dir():
         return whole, PlaceOptions()
@@ -61,7 +62,7 @@ def folder_and_options(place: str) -> tuple[Path, PlaceOptions]:
         with suppress(ValueError):
             given[key] = float(given[key])
     try:
-        return Path(folder).expanduser(), structured(given, PlaceOptions, "lerobot:FOLDER")
+        return Path(os.path.expanduser(folder)), structured(given, PlaceOptions, "lerobot:FOLDER")
     except ValidationFailed as misfit:
         said = [f"{'.'.join(map(str, problem.path))}: {problem.words()}" for problem in misfit.problems]
         raise ConfigError("\n".join(said)) from None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from functools import lru_cache
 from importlib.resources import files
@@ -196,7 +197,7 @@ def thing_named(name: str, beside: Path = Path()) -> tuple[Thing, mujoco.MjSpec 
     if name == "none":
         return Thing(), None
     if name.endswith(".xml"):
-        path = beside / Path(name).expanduser()
+        path = beside / Path(os.path.expanduser(name))
         if not path.is_file():
             raise UnknownName(f"gripper.object: there is no file {path}")
         return Thing(summary=path.stem), read_spec(path)

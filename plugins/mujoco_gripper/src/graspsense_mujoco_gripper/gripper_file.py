@@ -17,6 +17,7 @@ geoms = ["finger2_pad_collision", "finger2_collision"]
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from importlib import import_module
 from importlib.resources import files
@@ -172,7 +173,7 @@ def read_gripper(name: str) -> tuple[GripperFile, Path]:
 
     A name of `SHIPPED` is a gripper of this package, and an empty name its parallel gripper.
     """
-    path = Path(name).expanduser()
+    path = Path(os.path.expanduser(name))
     if not name or name in SHIPPED:
         path = Path(str(files("graspsense_mujoco_gripper") / f"{name or 'parallel'}.toml"))
     gripper = described(path, "gripper", GripperFile)
@@ -196,7 +197,7 @@ def model_path(name: str, folder: Path) -> Path:
     if name.startswith("menagerie:"):
         return _menagerie_path(*name.removeprefix("menagerie:").partition("/")[::2])
     if not name.startswith("package:"):
-        path = folder / Path(name).expanduser()
+        path = folder / Path(os.path.expanduser(name))
         if not path.is_file():
             raise ConfigError(f"there is no file {path}: name a MuJoCo model (.xml), or package:NAME:PATH")
         return path

@@ -17,6 +17,7 @@ cycles = 3.0
 
 from __future__ import annotations
 
+import os
 from importlib.resources import files
 from itertools import pairwise
 from math import cos, isfinite, pi, sin
@@ -144,7 +145,7 @@ def scene_named(name: str, around: str = "") -> Scene:
 
     Raises ConfigError.
     """
-    path = SCENES / f"{name}.toml" if name in SHIPPED_SCENES else Path(name).expanduser()
+    path = SCENES / f"{name}.toml" if name in SHIPPED_SCENES else Path(os.path.expanduser(name))
     is_scene = path.suffix == ".toml"
     if not around:
         return described(path, "MuJoCo scene", Scene) if is_scene else Scene(thing=name)
@@ -168,7 +169,7 @@ def read_scene(name: str, around: str = "") -> SceneModel:
     """
     name, number, instance = name.partition("#")
     scene = scene_named(name, around)
-    beside = Path(name).expanduser().parent if name.endswith(".toml") else Path()
+    beside = Path(os.path.expanduser(name)).parent if name.endswith(".toml") else Path()
     if scene.walls is not None:
         thing, spec = Thing(walls=scene.walls), scene.walls.spec(scene.thing)
     else:

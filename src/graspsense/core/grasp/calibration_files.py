@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import re
 from collections.abc import Mapping
 from datetime import datetime
@@ -73,7 +74,7 @@ def calibration_path(folder: str | Path, serial: str, kind: str) -> Path:
 def calibration_folder(given: str | Path) -> Path | None:
     """Return the folder that this setting names: an empty one that of the user, None if that has no home folder."""
     if given:
-        return Path(given).expanduser()
+        return Path(os.path.expanduser(given))
     data = data_folder()
     return None if data is None else data / "calibration"
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -29,7 +30,7 @@ MOST_NESTED: Final = 100
 def model_bytes(name: str) -> bytes:
     """Return the content of the file of a model. Raises ConfigError if it cannot be read, or is too large."""
     try:
-        content = first_bytes(Path(name).expanduser(), MODEL_BYTES.most)
+        content = first_bytes(Path(os.path.expanduser(name)), MODEL_BYTES.most)
     except (OSError, ValueError, RuntimeError) as error:
         raise ConfigError(
             f"model {name} cannot be read: {getattr(error, 'strerror', None) or error}"

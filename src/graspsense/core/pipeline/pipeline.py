@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import lru_cache
@@ -63,7 +64,7 @@ def model_for(settings: Settings, plugins: Plugins) -> Model | None:
             + f"\n  then use it: {set_option('classifier.model=model.json')}     or do without: "
             f"{set_option('classifier.type=none')}"
         )
-    if name.endswith(".json") and not Path(name).expanduser().exists():
+    if name.endswith(".json") and not Path(os.path.expanduser(name)).exists():
         raise ConfigError(
             f"there is no model {name} yet (classifier.model).\n"
             + _how_to_train(settings, name)

@@ -46,7 +46,7 @@ def is_csv(source: str) -> bool:
 
 def is_plain_file(source: str) -> bool:
     """Return whether a source is a file of samples, or a bag, of another program."""
-    path = Path(source).expanduser()
+    path = Path(os.path.expanduser(source))
     if os.path.isdir(path):
         return os.path.isfile(path / "metadata.yaml")
     return os.path.isfile(path) and path.suffix.lower() != ".toml" and not declared_beside(path).exists()
@@ -116,7 +116,7 @@ def _dataset(source: str) -> tuple[str, str] | None:
     kind, _, place = source.partition(":")
     if not place or kind not in datasets_with_recordings() or is_recording_number(kind, place):
         return None
-    return (kind, place) if kind not in KINDS or Path(place).expanduser().is_dir() else None
+    return (kind, place) if kind not in KINDS or Path(os.path.expanduser(place)).is_dir() else None
 
 
 def _relabelled(labelled: LabelledRecording, label: str | None) -> LabelledRecording:

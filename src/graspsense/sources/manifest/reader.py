@@ -46,7 +46,7 @@ def read_recordings(place: str) -> Iterator[LabelledRecording | UnreadableRecord
 
     Raises ConfigError if the manifest itself cannot be used.
     """
-    manifest = read_manifest(Path(place).expanduser())
+    manifest = read_manifest(Path(os.path.expanduser(place)))
     told = tuple(left_out(manifest))
     for file in files_of(manifest):
         for table in each_readable(file.name, partial(tables_of, manifest, file)):
@@ -62,7 +62,7 @@ def manifest_files(place: str) -> list[Path]:
 
     Raises ConfigError, DataDamaged.
     """
-    manifest = read_manifest(Path(place).expanduser())
+    manifest = read_manifest(Path(os.path.expanduser(place)))
     listed_in = [manifest.place.parent / manifest.keys.list] if manifest.keys.list else []
     files = [file.path for file in files_of(manifest)]
     return [*listed_in, *files, *sorted(_beside(manifest, {file.parent for file in files}))]

@@ -7,6 +7,7 @@ a file; the recording itself (.mcap) keeps it.
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -45,7 +46,7 @@ def read_exported(name: str) -> Recording:
     Raises ConfigError if there is no such file, DataDamaged if it was not written by `graspsense export`, and
     PluginUnavailable for Parquet without pyarrow.
     """
-    path = Path(name).expanduser()
+    path = Path(os.path.expanduser(name))
     foreign = ". Arrays of other programs are imported by a manifest (docs/import.md)"
     with readable(path, "a grasp of `graspsense export`", foreign):
         if path.suffix.lower() in TABLE_SUFFIXES:

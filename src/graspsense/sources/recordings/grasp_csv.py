@@ -9,6 +9,7 @@ for both pads; two are left and right. Without `velocity`, the velocity is the c
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Final
@@ -39,7 +40,7 @@ def named(path: str, columns: Mapping[str, Sequence[str]]) -> str:
 def read_csv(name: str) -> Recording:
     """Return the grasp of a CSV file whose columns the name lists, or that was exported and declares its own."""
     file, _, columns = name.partition("?")
-    exported = not columns and declared_beside(Path(file).expanduser()).exists()
+    exported = not columns and declared_beside(Path(os.path.expanduser(file))).exists()
     return read_exported(file) if exported else read_squeeze(name)
 
 
@@ -54,7 +55,7 @@ def read_squeeze(name: str) -> Recording:
                 + suggestion(quantity, QUANTITIES)
             )
         columns_of.setdefault(quantity, []).append(column)
-    path = Path(file or name).expanduser()
+    path = Path(os.path.expanduser(file or name))
     tables = read_text(path)
     missing = [quantity for quantity in REQUIRED if quantity not in columns_of]
     if missing:

@@ -15,6 +15,7 @@ ring and little finger together (https://icub-tech-iit.github.io/documentation, 
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Final
 
@@ -142,7 +143,7 @@ def read_grasp(path: Path) -> IcubGrasp:
 
 
 def _locate(name: str) -> Path:
-    given = Path(name).expanduser()
+    given = Path(os.path.expanduser(name))
     path = next((p for p in (given, given.parent / DATA_FOLDER / given.name) if p.is_file()), None)
     if path is not None:
         return path

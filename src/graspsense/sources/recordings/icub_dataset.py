@@ -9,6 +9,7 @@ squeezed yet. All of this was decided before any recognition rate was computed.
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterable, Iterator
 from operator import itemgetter
@@ -133,7 +134,7 @@ def _each(files: Iterable[GraspFile]) -> Iterator[tuple[GraspFile, IcubGrasp | U
 
 def _grasps(folder: str) -> list[GraspFile]:
     """Return the path, label and number of every grasp, sorted by label and number."""
-    given = Path(folder).expanduser()
+    given = Path(os.path.expanduser(folder))
     within = given / DATA_FOLDER
     place = within if within.is_dir() else given
     if not place.is_dir():
