@@ -367,3 +367,9 @@ def test_a_user_without_a_home_has_no_folder_for_compiled_code(monkeypatch):
     compiled_code_folder.cache_clear()
     assert compiled_code_folder() is None
     compiled_code_folder.cache_clear()
+
+
+def test_nothing_is_compiled_where_numba_is_switched_off(monkeypatch):
+    monkeypatch.setattr("numba.config.DISABLE_JIT", 1)
+    with pytest.raises(NotCompilable, match="NUMBA_DISABLE_JIT"):
+        compile_function(_twice)

@@ -148,6 +148,8 @@ def test_kept_code_is_used_at_once_where_numba_is_imported_anyway(monkeypatch, o
     monkeypatch.setattr(compiled, "kept", lambda slim: on_disk)
     monkeypatch.setitem(sys.modules, "numba", sys)
     assert Fits().choose_fast("auto", 6_000, True) == on_disk
+    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
+    assert not Fits().choose_fast("auto", 10**9, True)
 
 
 def test_a_tree_of_the_plain_form_counts(monkeypatch):

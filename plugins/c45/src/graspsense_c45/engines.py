@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from functools import cache
 from importlib.util import find_spec
@@ -33,7 +34,7 @@ class Fits:
     def choose_fast(self, engine: Engine, n_values: int, slim: bool) -> bool:
         """Return whether to fit a table of so many values by compiled code; slim: see `building.compiled`.
 
-        "auto" does not where it cannot be compiled; see `missing_for_fast`.
+        "auto" does not where it cannot be compiled: see `missing_for_fast`, or because numba is switched off.
 
         Raises ValueError for an unknown engine, and ModuleNotFoundError where "fast" is not installed.
         """
@@ -44,7 +45,7 @@ class Fits:
                 f"engine='fast' needs {' and '.join(missing_for_fast())}, which is not installed; "
                 "install graspsense-c45[fast] or use engine='plain'"
             )
-        if engine != "auto" or missing_for_fast():
+        if engine != "auto" or missing_for_fast() or os.environ.get("NUMBA_DISABLE_JIT", "0") != "0":
             return engine == "fast"
         loading_s = 0.0 if "numba" in sys.modules else LOADING_S
         worth = n_values >= WORTH_COMPILING or self._plain_s >= max(COMPILING_S, loading_s)

@@ -103,13 +103,15 @@ def compile_function(
     not used. The compiled function runs without the interpreter's lock, unless the options say otherwise.
 
     Raises NotCompilable for closures, for recursion (which numba's cache cannot hold), for anything that is not a
-    function written in Python, and where numba cannot be imported.
+    function written in Python, and where numba cannot be imported or is switched off (NUMBA_DISABLE_JIT).
     """
     options = options or CompileOptions()
     try:
         import numba
     except ImportError as error:
         raise NotCompilable(f'numba is not installed: pip install "{options.install}"') from error
+    if numba.config.DISABLE_JIT:
+        raise NotCompilable("NUMBA_DISABLE_JIT is set")
     if len(_COMPILED) >= MAX_COMPILED:
         _COMPILED.clear()
     return _Compilation(numba, options).outermost(plain_function(function))
