@@ -89,12 +89,14 @@ def frames_of(understood: Understood, episode: Episode) -> list[GraspColumns]:
 def label_of_task(task: str) -> str:
     """Return the text of a task as a label, which has no spaces and none of : # , beside that of CLASS:STATE.
 
-    >>> label_of_task("Pick up: the red cup"), label_of_task("can:full_open")
+    A full stop at its end says nothing: data sets have the same task with and without one.
+
+    >>> label_of_task("Pick up: the red cup."), label_of_task("can:full_open")
     ('Pick_up-_the_red_cup', 'can:full_open')
     """
     if re.fullmatch(r"[^\s:#,]+:[^\s:#,]+", task):
         return task
-    return re.sub(r"[:#,]", "-", re.sub(r"\s+", "_", task.strip()))
+    return re.sub(r"[:#,]", "-", re.sub(r"\s+", "_", task.strip().rstrip(".")))
 
 
 def _of_episode(
