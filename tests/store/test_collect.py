@@ -245,7 +245,7 @@ TOY = (("--object", "toy"), ("-o", "gripper.object=toy"))
 @every_case(
     ("labels", "more", "says"),
     [
-        ("", (), "nothing to collect"),
+        (",", (), "nothing to collect"),
         ("block,block", (), "named twice"),
         *((f"block,{label}", (), f"{label!r} is not a label") for label in ("my can:full", "can:full open", "can#2 b")),
         # An object that the gripper does not know, and one that contradicts the label.

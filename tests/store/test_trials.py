@@ -124,7 +124,7 @@ def test_trials_that_are_set_aside_are_not_used_until_they_are_brought_back(stor
         (("relabel", 2, 1, "--label", "toy"), "trial 1 .*label toy"),
         (("relabel", 1, "--label", "my toy"), "'my toy'"),
         (("relabel", 1), "give either --label CLASS:STATE or --as-recorded"),
-        (("aside", 1, "--why", " "), "--why is empty"),
+        (("aside", 1, "--why", " "), "'--why': it is empty"),
         (("aside", "1", "--why", "x"), "write DIR#NUMBER"),
         (("aside", "typo#1", "--why", "x"), "no store in"),
         (("relabel", 3, "--label", "block"), "trial 3 .*can:full_open.*block"),

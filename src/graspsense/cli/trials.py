@@ -123,8 +123,6 @@ def aside(refs: Sequence[str], why: str, as_json: bool) -> None:
     """Set trials aside: they stay in the store, but are not counted, exported as a table, or learned from."""
     from graspsense.store import changes
 
-    if not why.strip():
-        raise click.UsageError("--why is empty: give the reason")
     _change(refs, lambda store, numbers: changes.set_aside(store, numbers, why), as_json)
 
 
