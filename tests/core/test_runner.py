@@ -18,7 +18,7 @@ from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp import interrupts, runner
 from graspsense.core.grasp.runner import MAY_BE_CLOSED, run_grasp
 from graspsense.core.values.errors import ComponentFailed, NoDevice, RecordingEnded, TareRefused
-from graspsense.core.values.signals import EFFORT, VELOCITY, Command, Outcome, Phase, Reading
+from graspsense.core.values.signals import EFFORT, RUNNING, VELOCITY, Command, Outcome, Phase, Reading
 from graspsense.plugins.controllers.hybrid import HybridConfig, HybridController
 from graspsense.testing import laws
 
@@ -229,16 +229,21 @@ def test_a_grasp_that_is_interrupted_while_the_fingers_open_keeps_its_outcome(ti
 
 
 def test_a_step_that_fails_or_returns_no_command_is_named_with_what_it_returns():
-    # A phase that there is not, and those of the runner.
-    for phase in (99, int(Phase.OPENING), int(Phase.TARING), int(Phase.RELEASE)):
+    def ends_in(command, state, phase, outcome):
+        return command, state._replace(phase=phase, outcome=int(outcome))
 
-        def changed(command, state, phase=phase):
-            return command, state._replace(phase=phase)
-
-        lost = run_grasp(Scripted(squeezing, bottle), law(changed, 1), RUN)
-        assert (lost.outcome, f"the phase {phase}" in lost.reason) == (Outcome.ABORTED, True)
-    for act, error in ((fail, "ZeroDivisionError"), (lambda command, state: command, "ValueError")):
-        grasp = run_grasp(Scripted(squeezing, bottle), law(act, 900), RUN)
+    failures = [
+        (fail, "ZeroDivisionError", 900),
+        (lambda command, state: command, "ValueError", 900),
+        (lambda command, state: (None, state), "TypeError", 900),
+        (lambda command, state: (command, None), "AttributeError", 900),
+    ]
+    # A phase that there is not, and those of the runner, also at the beginning and in the hold.
+    for phase in (99, int(Phase.OPENING), int(Phase.TARING), int(Phase.RELEASE), None):
+        for outcome in (RUNNING, Outcome.STEADY):
+            failures.append((partial(ends_in, phase=phase, outcome=outcome), f"the phase {phase}", 1))
+    for act, error, tick in failures:
+        grasp = run_grasp(Scripted(squeezing, bottle), law(act, tick), RUN)
         assert grasp.outcome is Outcome.ABORTED
         for part in ("law.<locals>.step of the controller", error, "(Command, state)"):
             assert part in grasp.reason

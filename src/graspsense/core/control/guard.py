@@ -10,11 +10,23 @@ from __future__ import annotations
 import operator
 from collections.abc import Callable
 from math import fsum, inf
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from graspsense.core.control.contact import either_touches
 from graspsense.core.values.errors import FAILURES, named, place_of
-from graspsense.core.values.signals import EFFORT, FORCE, POSITION, VELOCITY, Command, Frame, Reading
+from graspsense.core.values.signals import (
+    CLOSING,
+    EFFORT,
+    FORCE,
+    POSITION,
+    RUNNING,
+    STEADY,
+    VELOCITY,
+    Command,
+    Frame,
+    Phase,
+    Reading,
+)
 
 
 class GuardParams(NamedTuple):
@@ -105,24 +117,29 @@ def guard(
     return Command(kind, value, effort_limit, speed_limit), state
 
 
+_PHASES: Final = frozenset(Phase)
 Step = Callable[[Any, Any, Reading], tuple[Command, Any]]
 
 
 class StepFailed(Exception):
-    """A controller whose step raised an exception, or returned what is no command."""
+    """A controller whose step raised an exception, or returned what is no command or no state."""
 
 
 def with_plain_commands(step: Step) -> Step:
     """Return the step of a controller, run by the interpreter, with commands of plain numbers for the guard to compare.
 
     A controller is the code of others. A subclass of float, as numpy has one, can define what `<` means. The step
-    raises StepFailed where the controller raises, or returns anything but a Command of numbers and a state.
+    raises StepFailed where the controller raises, or returns anything but a Command of numbers and a state. While the
+    fingers are to close or hold, the phase of the state is one of a controller: the runner opens the fingers.
     """
     name = f"{getattr(step, '__module__', '')}.{getattr(step, '__qualname__', step)}"
 
     def plain_step(params: Any, state: Any, reading: Reading) -> tuple[Command, Any]:
         try:
             command, state = step(params, state, reading)
+            phase, outcome = state.phase, state.outcome
+            if phase not in CLOSING and (outcome in (RUNNING, STEADY) or phase not in _PHASES):
+                raise ValueError(f"the phase {phase} of its state is none of APPROACH, SQUEEZE and HOLD")
             kind, value, effort_limit, speed_limit = command
             if (
                 type(command) is Command
@@ -136,8 +153,9 @@ def with_plain_commands(step: Step) -> Step:
                 raise TypeError(
                     f"the kind of the command is {kind!r}; EFFORT, VELOCITY, POSITION, FORCE are numbers"
                 )
-            plain = Command(_integer(kind), _number(value), _number(effort_limit), _number(speed_limit))
-            return plain, state
+            # The method of int itself, as that of float below.
+            number = int.__int__(operator.index(kind))
+            return Command(number, _number(value), _number(effort_limit), _number(speed_limit)), state
         except FAILURES as error:
             raise StepFailed(
                 f"{name} of the controller failed: {named(error)}{place_of(error)}. It takes (params, state, "
@@ -145,10 +163,6 @@ def with_plain_commands(step: Step) -> Step:
             ) from error
 
     return plain_step
-
-
-def _integer(value: Any) -> int:
-    return int.__int__(value) if isinstance(value, int) else operator.index(value)
 
 
 def _number(value: Any) -> float:

@@ -53,7 +53,6 @@ from graspsense.core.values.faults import LIMITED, Fault, faults_among
 from graspsense.core.values.features import Prediction
 from graspsense.core.values.signals import (
     APPROACH,
-    CLOSING,
     HOLD,
     NO_GAP,
     RUNNING,
@@ -246,7 +245,6 @@ STUCK: Final = (
     f"a tick did not end in {STUCK_S:g} s: the controller, or what watches or records the grasp, hangs, or this "
     "program was stopped; look at its loops and at what it waits for"
 )
-_PHASES: Final = frozenset(Phase)
 
 
 class _NotDelivered(Exception):
@@ -393,7 +391,7 @@ class _Grasp:
             self.last = frame
             if self.first_t_s is None:
                 self.first_t_s = frame.t_s
-            acted, earlier = self._acted(state), state.phase
+            acted = self._acted(state)
             command, state = advance(params, state, reading)
             self.state = state = self._not_yet_at_rest(state)
             stepped, same_phase = phase != TARING, state.phase == phase
@@ -403,7 +401,6 @@ class _Grasp:
             if not same_phase:
                 if phase == TARING and not self._tared(images, frame):
                     return
-                self.state = state = self._known(earlier, state, frame)
                 phase, newest = state.phase, pads.counter
                 self._event(frame.t_s, Phase(phase), Phase(phase).name.lower())
             if state.guard is not watcher:
@@ -445,17 +442,6 @@ class _Grasp:
         if problem := self.delivered.problem(reading):
             raise _NotDelivered(f"{self.info.name} delivered what it does not declare: {problem}")
         return reading
-
-    def _known(self, earlier: int, state: TickState, frame: Frame) -> TickState:
-        """Return a state whose phase exists. Raises StepFailed, after which the gripper releases.
-
-        While the fingers close, it is one of those that a controller has: the runner opens them and ends the grasp.
-        """
-        closes = earlier in CLOSING and state.law.outcome == RUNNING
-        if state.phase in (CLOSING if closes else _PHASES):
-            return state
-        self.state = stopped(self.params.schedule, state, frame)
-        raise StepFailed(f"the controller gave the phase {state.phase}: it has APPROACH, SQUEEZE and HOLD")
 
     def _not_yet_at_rest(self, state: TickState) -> TickState:
         """Return a state in which fingers that open rest at the earliest when the gripper has acted on the command.
