@@ -153,9 +153,8 @@ def with_plain_commands(step: Step) -> Step:
                 raise TypeError(
                     f"the kind of the command is {kind!r}; EFFORT, VELOCITY, POSITION, FORCE are numbers"
                 )
-            # The method of int itself, as that of float below.
-            number = int.__int__(operator.index(kind))
-            return Command(number, _number(value), _number(effort_limit), _number(speed_limit)), state
+            numbers = _number(value), _number(effort_limit), _number(speed_limit)
+            return Command(int.__int__(operator.index(kind)), *numbers), state
         except FAILURES as error:
             raise StepFailed(
                 f"{name} of the controller failed: {named(error)}{place_of(error)}. It takes (params, state, "
@@ -166,6 +165,6 @@ def with_plain_commands(step: Step) -> Step:
 
 
 def _number(value: Any) -> float:
-    # The method of float itself, since that of a subclass can return anything.
+    # The method of float itself, as that of int above, since that of a subclass can return anything.
     # Not `float`, which takes text for a number too.
     return float.__float__(value) if isinstance(value, float) else fsum((value,))
