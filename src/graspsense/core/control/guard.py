@@ -78,7 +78,9 @@ def guard(
                 effort_limit = params.first_effort_n
             if params.first_speed_m_s < speed_limit:
                 speed_limit = params.first_speed_m_s
-    if stopped == 1 or value != value or not (effort_limit >= 0.0 and speed_limit >= 0.0):
+    # An unknown kind, or a position out of reach, is treated like NaN.
+    is_known = EFFORT <= kind <= FORCE and not (kind == POSITION and value == inf)
+    if stopped == 1 or value != value or not (effort_limit >= 0.0 and speed_limit >= 0.0 and is_known):
         halt = Command(EFFORT, 0.0, params.effort_limit_n, params.speed_limit_m_s)
         return halt, GuardState(contact_seen, acted + 1, 1)
 
@@ -98,13 +100,9 @@ def guard(
     elif kind == FORCE:
         value = min(max(value, 0.0), effort_limit)
         lowered = speed_limit < command.speed_limit_m_s < inf
-    elif kind == POSITION and value < inf:
+    else:
         value = max(value, 0.0)
         lowered = effort_limit < command.effort_limit_n < inf or speed_limit < command.speed_limit_m_s < inf
-    else:
-        # An unknown kind, or a position out of reach, is treated like NaN.
-        halt = Command(EFFORT, 0.0, params.effort_limit_n, params.speed_limit_m_s)
-        return halt, GuardState(contact_seen, acted + 1, 1)
     if value != asked or lowered:
         acted += 1
     elif kind == EFFORT:
