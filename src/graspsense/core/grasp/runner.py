@@ -247,12 +247,8 @@ STUCK: Final = (
 )
 
 
-class _NotDelivered(Exception):
-    """A reading that is not what the gripper declares."""
-
-
-class _Overdue(Exception):
-    """A grasp that took longer than the limit."""
+class _GraspFailed(Exception):
+    """A grasp that took longer than the limit, or a reading that is not what the gripper declares."""
 
 
 class _Grasp:
@@ -282,7 +278,7 @@ class _Grasp:
         self.state: TickState = first_state(controller.init())
         self.recorder = TraceRecorder({**SI_UNITS, **info.units})
         self.events: list[GraspEvent] = []
-        self.late = self.guarded = self.squeezed = self.squeezed_guarded = 0
+        self.late = self.guarded = self.squeezed = self.squeezed_guarded = self.release_ticks = 0
         self.failed_sinks: list[str] = []
         self.may_be_closed = False
         self.first_t_s: float | None = None
@@ -323,7 +319,7 @@ class _Grasp:
             ending = Outcome.DEVICE_LOST, str(error)
         except RecordingEnded:
             ending = self._recording_ended()
-        except (TareRefused, _Overdue, _NotDelivered, StepFailed) as error:
+        except (TareRefused, _GraspFailed, StepFailed) as error:
             ending = Outcome.ABORTED, str(error)
         except KeyboardInterrupt:
             self.interrupted = not self.interrupts.stuck
@@ -383,7 +379,7 @@ class _Grasp:
         state, phase, watcher = self.state, self.state.phase, self.state.guard
         images: list[Pads] = []
         newest = n_ticks = 0
-        most_ticks, losses = self._most_ticks(), self.losses
+        most_ticks, losses = self._most_ticks(seconds_at_most(run)), self.losses
         while n_ticks < most_ticks:
             n_ticks += 1
             reading = self._read(timeout_s)
@@ -430,7 +426,7 @@ class _Grasp:
                 state = self._watched(self.watcher, frame, state)
             if state.done or watcher.stopped or self._fault() is not None:
                 return
-        raise _Overdue(overdue(run))
+        raise _GraspFailed(overdue(run))
 
     def _read(self, timeout_s: float) -> Reading:
         """Return the next reading, with which a tick begins. It came, and is what the gripper declares."""
@@ -440,7 +436,7 @@ class _Grasp:
         if reading is None:
             raise DeviceLost(no_frame(self.run, self.info))
         if problem := self.delivered.problem(reading):
-            raise _NotDelivered(f"{self.info.name} delivered what it does not declare: {problem}")
+            raise _GraspFailed(f"{self.info.name} delivered what it does not declare: {problem}")
         return reading
 
     def _not_yet_at_rest(self, state: TickState) -> TickState:
@@ -450,6 +446,10 @@ class _Grasp:
         """
         if state.phase not in (Phase.OPENING, RELEASE):
             return state
+        self.release_ticks += state.phase == RELEASE
+        # By a clock that stands still it would have no end. Frames can come faster than declared.
+        if self.release_ticks > self._most_ticks(3.0 * self.run.opening_timeout_s):
+            return state._replace(done=1)
         delay_s = self.backend.command_delay_s
         if state.phase == RELEASE and self.protection is not None:
             # A gap that is told late, or that is wrong, stands still for longer.
@@ -459,12 +459,12 @@ class _Grasp:
             return state
         return state._replace(still=RestState(earliest_s, still.gap_m))
 
-    def _most_ticks(self) -> float:
-        """Return the number of ticks that a grasp may take; a recording ends by itself.
+    def _most_ticks(self, seconds: float) -> float:
+        """Return the number of ticks that a grasp or its release may take; a recording ends by itself.
 
         Ticks are counted, since the clock of a device may stand still, and the squeeze must end nevertheless.
         """
-        return inf if self.info.opening is None else ceil(seconds_at_most(self.run) * self.info.rate_hz)
+        return inf if self.info.opening is None else ceil(seconds * self.info.rate_hz)
 
     def _show(self, reading: Reading, phase: int, command: Command) -> None:
         """Pass a tick to the sinks."""
