@@ -18,7 +18,7 @@ from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp import interrupts, runner
 from graspsense.core.grasp.runner import MAY_BE_CLOSED, run_grasp
 from graspsense.core.values.errors import ComponentFailed, NoDevice, RecordingEnded, TareRefused
-from graspsense.core.values.signals import EFFORT, VELOCITY, Command, Outcome, Phase, Reading
+from graspsense.core.values.signals import EFFORT, RUNNING, VELOCITY, Command, Outcome, Phase, Reading
 from graspsense.plugins.controllers.hybrid import HybridConfig, HybridController
 from graspsense.testing import laws
 
@@ -229,16 +229,21 @@ def test_a_grasp_that_is_interrupted_while_the_fingers_open_keeps_its_outcome(ti
 
 
 def test_a_step_that_fails_or_returns_no_command_is_named_with_what_it_returns():
-    # A phase that there is not, and those of the runner.
-    for phase in (99, int(Phase.OPENING), int(Phase.TARING), int(Phase.RELEASE)):
+    def ends_in(command, state, phase, outcome):
+        return command, state._replace(phase=phase, outcome=int(outcome))
 
-        def changed(command, state, phase=phase):
-            return command, state._replace(phase=phase)
-
-        lost = run_grasp(Scripted(squeezing, bottle), law(changed, 1), RUN)
-        assert (lost.outcome, f"the phase {phase}" in lost.reason) == (Outcome.ABORTED, True)
-    for act, error in ((fail, "ZeroDivisionError"), (lambda command, state: command, "ValueError")):
-        grasp = run_grasp(Scripted(squeezing, bottle), law(act, 900), RUN)
+    failures = [
+        (fail, "ZeroDivisionError", 900),
+        (lambda command, state: command, "ValueError", 900),
+        (lambda command, state: (None, state), "TypeError", 900),
+        (lambda command, state: (command, None), "AttributeError", 900),
+    ]
+    # A phase that there is not, and those of the runner, also at the beginning and in the hold.
+    for phase in (99, int(Phase.OPENING), int(Phase.TARING), int(Phase.RELEASE), None):
+        for outcome in (RUNNING, Outcome.STEADY):
+            failures.append((partial(ends_in, phase=phase, outcome=outcome), f"the phase {phase}", 1))
+    for act, error, tick in failures:
+        grasp = run_grasp(Scripted(squeezing, bottle), law(act, tick), RUN)
         assert grasp.outcome is Outcome.ABORTED
         for part in ("law.<locals>.step of the controller", error, "(Command, state)"):
             assert part in grasp.reason
@@ -386,13 +391,18 @@ def test_other_ends_of_a_session_let_go_too_and_tell_who_listened_before(number)
     assert (grasp.outcome, heard, let_go(gripper)) == (Outcome.ABORTED, [number], True)
 
 
-def test_a_device_whose_clock_stands_still_does_not_squeeze_for_ever():
+@every_case(("stops_s", "outcome"), [(1.2, Outcome.ABORTED), (1.82, Outcome.STEADY)])
+def test_a_device_whose_clock_stands_still_does_not_squeeze_nor_open_for_ever(stops_s, outcome):
     stopped = with_frame(
-        t_s=lambda frame: min(frame.t_s, 1.2), gap_m=lambda frame: squeezing(min(frame.t_s, 1.2))
+        t_s=lambda frame: min(frame.t_s, stops_s),
+        dt_s=lambda frame: frame.dt_s * (frame.t_s <= stops_s),
+        gap_m=lambda frame: squeezing(min(frame.t_s, stops_s)),
     )
     gripper = Changed(stopped, clock="device")
-    grasp = run_grasp(gripper, HYBRID, RunConfig(grasp_timeout_s=2.0, opening_timeout_s=0.2))
-    assert (grasp.outcome, gripper.commands[-1].value) == (Outcome.ABORTED, 0.0)
+    grasp = run_grasp(gripper, HYBRID, RunConfig(grasp_timeout_s=20.0, opening_timeout_s=0.2))
+    assert (grasp.outcome, gripper.commands[-1].value) == (outcome, 0.0)
+    assert "clock stands still" in " ".join(grasp.warnings)
+    assert len(grasp.trace) < 3000
 
 
 @every_case(

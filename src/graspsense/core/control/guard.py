@@ -10,11 +10,23 @@ from __future__ import annotations
 import operator
 from collections.abc import Callable
 from math import fsum, inf
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from graspsense.core.control.contact import either_touches
 from graspsense.core.values.errors import FAILURES, named, place_of
-from graspsense.core.values.signals import EFFORT, FORCE, POSITION, VELOCITY, Command, Frame, Reading
+from graspsense.core.values.signals import (
+    CLOSING,
+    EFFORT,
+    FORCE,
+    POSITION,
+    RUNNING,
+    STEADY,
+    VELOCITY,
+    Command,
+    Frame,
+    Phase,
+    Reading,
+)
 
 
 class GuardParams(NamedTuple):
@@ -66,7 +78,9 @@ def guard(
                 effort_limit = params.first_effort_n
             if params.first_speed_m_s < speed_limit:
                 speed_limit = params.first_speed_m_s
-    if stopped == 1 or value != value or not (effort_limit >= 0.0 and speed_limit >= 0.0):
+    # An unknown kind, or a position out of reach, is treated like NaN.
+    is_known = EFFORT <= kind <= FORCE and not (kind == POSITION and value == inf)
+    if stopped == 1 or value != value or not (effort_limit >= 0.0 and speed_limit >= 0.0 and is_known):
         halt = Command(EFFORT, 0.0, params.effort_limit_n, params.speed_limit_m_s)
         return halt, GuardState(contact_seen, acted + 1, 1)
 
@@ -86,13 +100,9 @@ def guard(
     elif kind == FORCE:
         value = min(max(value, 0.0), effort_limit)
         lowered = speed_limit < command.speed_limit_m_s < inf
-    elif kind == POSITION and value < inf:
+    else:
         value = max(value, 0.0)
         lowered = effort_limit < command.effort_limit_n < inf or speed_limit < command.speed_limit_m_s < inf
-    else:
-        # An unknown kind, or a position out of reach, is treated like NaN.
-        halt = Command(EFFORT, 0.0, params.effort_limit_n, params.speed_limit_m_s)
-        return halt, GuardState(contact_seen, acted + 1, 1)
     if value != asked or lowered:
         acted += 1
     elif kind == EFFORT:
@@ -105,24 +115,29 @@ def guard(
     return Command(kind, value, effort_limit, speed_limit), state
 
 
+_PHASES: Final = frozenset(Phase)
 Step = Callable[[Any, Any, Reading], tuple[Command, Any]]
 
 
 class StepFailed(Exception):
-    """A controller whose step raised an exception, or returned what is no command."""
+    """A controller whose step raised an exception, or returned what is no command or no state."""
 
 
 def with_plain_commands(step: Step) -> Step:
     """Return the step of a controller, run by the interpreter, with commands of plain numbers for the guard to compare.
 
     A controller is the code of others. A subclass of float, as numpy has one, can define what `<` means. The step
-    raises StepFailed where the controller raises, or returns anything but a Command of numbers and a state.
+    raises StepFailed where the controller raises, or returns anything but a Command of numbers and a state. While the
+    fingers are to close or hold, the phase of the state is one of a controller: the runner opens the fingers.
     """
     name = f"{getattr(step, '__module__', '')}.{getattr(step, '__qualname__', step)}"
 
     def plain_step(params: Any, state: Any, reading: Reading) -> tuple[Command, Any]:
         try:
             command, state = step(params, state, reading)
+            phase, outcome = state.phase, state.outcome
+            if phase not in CLOSING and (outcome in (RUNNING, STEADY) or phase not in _PHASES):
+                raise ValueError(f"the phase {phase} of its state is none of APPROACH, SQUEEZE and HOLD")
             kind, value, effort_limit, speed_limit = command
             if (
                 type(command) is Command
@@ -136,8 +151,8 @@ def with_plain_commands(step: Step) -> Step:
                 raise TypeError(
                     f"the kind of the command is {kind!r}; EFFORT, VELOCITY, POSITION, FORCE are numbers"
                 )
-            plain = Command(_integer(kind), _number(value), _number(effort_limit), _number(speed_limit))
-            return plain, state
+            numbers = _number(value), _number(effort_limit), _number(speed_limit)
+            return Command(int.__int__(operator.index(kind)), *numbers), state
         except FAILURES as error:
             raise StepFailed(
                 f"{name} of the controller failed: {named(error)}{place_of(error)}. It takes (params, state, "
@@ -147,11 +162,7 @@ def with_plain_commands(step: Step) -> Step:
     return plain_step
 
 
-def _integer(value: Any) -> int:
-    return int.__int__(value) if isinstance(value, int) else operator.index(value)
-
-
 def _number(value: Any) -> float:
-    # The method of float itself, since that of a subclass can return anything.
+    # The method of float itself, as that of int above, since that of a subclass can return anything.
     # Not `float`, which takes text for a number too.
     return float.__float__(value) if isinstance(value, float) else fsum((value,))

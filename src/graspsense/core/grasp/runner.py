@@ -53,7 +53,6 @@ from graspsense.core.values.faults import LIMITED, Fault, faults_among
 from graspsense.core.values.features import Prediction
 from graspsense.core.values.signals import (
     APPROACH,
-    CLOSING,
     HOLD,
     NO_GAP,
     RUNNING,
@@ -246,15 +245,10 @@ STUCK: Final = (
     f"a tick did not end in {STUCK_S:g} s: the controller, or what watches or records the grasp, hangs, or this "
     "program was stopped; look at its loops and at what it waits for"
 )
-_PHASES: Final = frozenset(Phase)
 
 
-class _NotDelivered(Exception):
-    """A reading that is not what the gripper declares."""
-
-
-class _Overdue(Exception):
-    """A grasp that took longer than the limit."""
+class _GraspFailed(Exception):
+    """A grasp that took longer than the limit, or a reading that is not what the gripper declares."""
 
 
 class _Grasp:
@@ -284,7 +278,7 @@ class _Grasp:
         self.state: TickState = first_state(controller.init())
         self.recorder = TraceRecorder({**SI_UNITS, **info.units})
         self.events: list[GraspEvent] = []
-        self.late = self.guarded = self.squeezed = self.squeezed_guarded = 0
+        self.late = self.guarded = self.squeezed = self.squeezed_guarded = self.release_ticks = 0
         self.failed_sinks: list[str] = []
         self.may_be_closed = False
         self.first_t_s: float | None = None
@@ -325,7 +319,7 @@ class _Grasp:
             ending = Outcome.DEVICE_LOST, str(error)
         except RecordingEnded:
             ending = self._recording_ended()
-        except (TareRefused, _Overdue, _NotDelivered, StepFailed) as error:
+        except (TareRefused, _GraspFailed, StepFailed) as error:
             ending = Outcome.ABORTED, str(error)
         except KeyboardInterrupt:
             self.interrupted = not self.interrupts.stuck
@@ -385,7 +379,7 @@ class _Grasp:
         state, phase, watcher = self.state, self.state.phase, self.state.guard
         images: list[Pads] = []
         newest = n_ticks = 0
-        most_ticks, losses = self._most_ticks(), self.losses
+        most_ticks, losses = self._most_ticks(seconds_at_most(run)), self.losses
         while n_ticks < most_ticks:
             n_ticks += 1
             reading = self._read(timeout_s)
@@ -393,7 +387,7 @@ class _Grasp:
             self.last = frame
             if self.first_t_s is None:
                 self.first_t_s = frame.t_s
-            acted, earlier = self._acted(state), state.phase
+            acted = self._acted(state)
             command, state = advance(params, state, reading)
             self.state = state = self._not_yet_at_rest(state)
             stepped, same_phase = phase != TARING, state.phase == phase
@@ -403,7 +397,6 @@ class _Grasp:
             if not same_phase:
                 if phase == TARING and not self._tared(images, frame):
                     return
-                self.state = state = self._known(earlier, state, frame)
                 phase, newest = state.phase, pads.counter
                 self._event(frame.t_s, Phase(phase), Phase(phase).name.lower())
             if state.guard is not watcher:
@@ -433,7 +426,7 @@ class _Grasp:
                 state = self._watched(self.watcher, frame, state)
             if state.done or watcher.stopped or self._fault() is not None:
                 return
-        raise _Overdue(overdue(run))
+        raise _GraspFailed(overdue(run))
 
     def _read(self, timeout_s: float) -> Reading:
         """Return the next reading, with which a tick begins. It came, and is what the gripper declares."""
@@ -443,19 +436,8 @@ class _Grasp:
         if reading is None:
             raise DeviceLost(no_frame(self.run, self.info))
         if problem := self.delivered.problem(reading):
-            raise _NotDelivered(f"{self.info.name} delivered what it does not declare: {problem}")
+            raise _GraspFailed(f"{self.info.name} delivered what it does not declare: {problem}")
         return reading
-
-    def _known(self, earlier: int, state: TickState, frame: Frame) -> TickState:
-        """Return a state whose phase exists. Raises StepFailed, after which the gripper releases.
-
-        While the fingers close, it is one of those that a controller has: the runner opens them and ends the grasp.
-        """
-        closes = earlier in CLOSING and state.law.outcome == RUNNING
-        if state.phase in (CLOSING if closes else _PHASES):
-            return state
-        self.state = stopped(self.params.schedule, state, frame)
-        raise StepFailed(f"the controller gave the phase {state.phase}: it has APPROACH, SQUEEZE and HOLD")
 
     def _not_yet_at_rest(self, state: TickState) -> TickState:
         """Return a state in which fingers that open rest at the earliest when the gripper has acted on the command.
@@ -464,6 +446,10 @@ class _Grasp:
         """
         if state.phase not in (Phase.OPENING, RELEASE):
             return state
+        self.release_ticks += state.phase == RELEASE
+        # By a clock that stands still it would have no end. Frames can come faster than declared.
+        if self.release_ticks > self._most_ticks(3.0 * self.run.opening_timeout_s):
+            return state._replace(done=1)
         delay_s = self.backend.command_delay_s
         if state.phase == RELEASE and self.protection is not None:
             # A gap that is told late, or that is wrong, stands still for longer.
@@ -473,12 +459,12 @@ class _Grasp:
             return state
         return state._replace(still=RestState(earliest_s, still.gap_m))
 
-    def _most_ticks(self) -> float:
-        """Return the number of ticks that a grasp may take; a recording ends by itself.
+    def _most_ticks(self, seconds: float) -> float:
+        """Return the number of ticks that a grasp or its release may take; a recording ends by itself.
 
         Ticks are counted, since the clock of a device may stand still, and the squeeze must end nevertheless.
         """
-        return inf if self.info.opening is None else ceil(seconds_at_most(self.run) * self.info.rate_hz)
+        return inf if self.info.opening is None else ceil(seconds * self.info.rate_hz)
 
     def _show(self, reading: Reading, phase: int, command: Command) -> None:
         """Pass a tick to the sinks."""

@@ -157,7 +157,8 @@ class GapJump:
     def __init__(self, speed_limit_m_s: float) -> None:
         self._limit_m_s = speed_limit_m_s
         self._gap_m, self._dt_s = nan, 0.0
-        self._told_m_s = [speed_limit_m_s, speed_limit_m_s]
+        # What moves the fingers at first, or how old the first gap is, is not known.
+        self._told_m_s = [inf, inf]
         self._direction, self._effort = 0, False
         self._velocity_m_s, self._moved = 0.0, False
         self.step_m = 0.0
