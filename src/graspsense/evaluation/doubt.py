@@ -14,7 +14,7 @@ from graspsense.core.learn.certainty import Certainty, certainty_of
 from graspsense.core.learn.conformal import (
     COVERAGE,
     PredictionSets,
-    can_be_held_out,
+    exchangeable_instances,
     reach_of,
     sets_of,
     units_needed,
@@ -130,14 +130,6 @@ def _unit(labelled: Labelled) -> str:
     if exchangeable_instances(labelled) is None:
         return "trials"
     return "sessions" if labelled.sessions else "groups" if labelled.grouped else "instances"
-
-
-def exchangeable_instances(labelled: Labelled) -> tuple[str, ...] | None:
-    """Return the instances of the trials; None if they are not known, or named ones cannot be held out."""
-    if labelled.instances is None or labelled.grouped:
-        return labelled.instances
-    named = {*zip(labelled.labels, labelled.instances, strict=True)}
-    return labelled.instances if can_be_held_out(named) else None
 
 
 @frozen(kw_only=True, eq=False)

@@ -172,10 +172,10 @@ def _on_instances(trials: Labelled) -> Iterator[str]:
 
 
 def _on_blocks(trials: Labelled) -> Iterator[str]:
-    """Note that drift can tell recorded labels, and that no control shows it, where each label is one block."""
+    """Note that drift can tell recorded labels, and that no control shows it, where each is one block, or nearly."""
     if in_stretches(trials):
         yield (
-            "in the order of recording, the trials of each label are one block: what changes with time, such as a "
-            "temperature or the zero of a sensor, may tell the labels, and recording_order cannot show it. Grasp "
+            "in the order of recording, the trials of each label are one block, or nearly: what changes with time, as "
+            "a temperature or the zero of a sensor, may tell the labels, and recording_order cannot show it. Grasp "
             "the objects in turn"
         )

@@ -15,12 +15,13 @@ from typing import Final, Literal
 import numpy as np
 from attrs import evolve, frozen
 
+from graspsense.core.learn.conformal import exchangeable_instances
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.features import FeatureTable
 from graspsense.evaluation.chosen import ChosenRate, comparisons_of, rate_of_chosen
 from graspsense.evaluation.crossval import ClassifierFactory, FitRefused, cross_validate
-from graspsense.evaluation.doubt import HeldOut, SetCoverage, exchangeable_instances
+from graspsense.evaluation.doubt import HeldOut, SetCoverage
 from graspsense.evaluation.folds import (
     Folds,
     commonest,

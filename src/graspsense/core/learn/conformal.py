@@ -34,6 +34,8 @@ from graspsense.core.learn.stored_values import StoredValues
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from graspsense.core.learn.labelled import Labelled
+
 COVERAGE: Final = 0.9
 """Share of the trials whose set shall contain the true label."""
 WITHIN_REACH: Final = 0.98
@@ -90,6 +92,14 @@ def can_be_held_out(named: Iterable[tuple[str, str | None]]) -> bool:
     """
     of_label = Counter(label for label, _ in named)
     return 2 * sum(instances > 1 for instances in of_label.values()) > len(of_label)
+
+
+def exchangeable_instances(labelled: Labelled) -> tuple[str, ...] | None:
+    """Return the instances of the trials; None if they are not known, or named ones cannot be held out."""
+    if labelled.instances is None or labelled.grouped:
+        return labelled.instances
+    named = {*zip(labelled.labels, labelled.instances, strict=True)}
+    return labelled.instances if can_be_held_out(named) else None
 
 
 @frozen(kw_only=True)

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from graspsense.core.components.caller import option
+from graspsense.core.learn.conformal import exchangeable_instances
 from graspsense.core.learn.groups import beyond_chance, means_of
 
 if TYPE_CHECKING:
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
 
 LEAST_LINES: Final = 5
 """Trials from which on their values can show more than chance."""
+_IN_TURNS: Final = 1.5
+"""Mean number of equal stretches of a label above which labels are in turns: two of each, or of more than half."""
 _DRIFT: Final = 5.0
 """Standard deviations by which features follow the time within all labels more than in random order, if they drift."""
 
@@ -38,12 +41,13 @@ def confounded(labelled: Labelled) -> str:
                 f"all trials of a label have the same {name}: which of both is recognised cannot be told. Record each "
                 f"label with several; a feature can be left out ({option('features', python='columns')})"
             )
-    named = labelled.instances is not None and not labelled.grouped
+    named = exchangeable_instances(labelled) is not None and not labelled.grouped
     if in_stretches(labelled) and (not named or _drifts(labelled)):
+        objects = "" if named else f"name several objects of each ({option('instance', 'COLUMN')}), "
         return (
-            "each label was recorded in one stretch: whether it is recognised by its object, or by what changed from "
-            "one stretch to the next, as a drift or a mounting, cannot be told. Record the labels in turns"
-            + ("" if named else f", or name several objects of each ({option('instance', 'COLUMN')})")
+            "each label was recorded in one stretch, or nearly: whether it is recognised by its object, or by what "
+            "changed from one stretch to the next, as a drift or a mounting, cannot be told. Record the labels in "
+            f"turns, {objects}or state the order of a table that was sorted later ({option('order', 'COLUMN')})"
         )
     return ""
 
@@ -60,11 +64,19 @@ def says_the_label(values: Sequence[Hashable], labels: Sequence[str]) -> bool:
 
 
 def in_stretches(labelled: Labelled) -> bool:
-    """Return whether the trials of each label are one block in the order of recording, as far as that is known."""
+    """Return whether each label is one block in the order of recording, or nearly, as far as that is known.
+
+    A label counts as in as many equal stretches as 1 over the sum of the squares of their shares (M. O. Hill, Ecology
+    54 (1973) 427): a grasp apart from its others hardly makes a second one. A label with one trial shows nothing.
+    """
     if labelled.order is None or labelled.provenance.get("simulated"):
         return False
     in_time = [labelled.labels[row] for row in np.argsort(labelled.order, kind="stable").tolist()]
-    return sum(1 for _ in groupby(in_time)) == len(labelled.classes) < len(in_time)
+    trials = Counter(in_time)
+    squares = dict.fromkeys((label for label, n in trials.items() if n > 1), 0.0)
+    for label, stretch in groupby(label for label in in_time if label in squares):
+        squares[label] += (len(list(stretch)) / trials[label]) ** 2
+    return len(squares) > 1 and sum(1.0 / share for share in squares.values()) <= _IN_TURNS * len(squares)
 
 
 def _drifts(labelled: Labelled) -> bool:
