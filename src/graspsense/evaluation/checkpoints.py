@@ -140,7 +140,7 @@ def _answers(
     for i, label in zip(numbers, pooled.predicted, strict=True):
         predicted[i] = label
     sizes, covered, reason = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.bool_), ""
-    inside = evolve(HeldOut.from_trials(part.labelled, pooled, folds), instances=own).members()
+    inside = HeldOut(answers=pooled, trials=evolve(part.labelled, instances=own), folds=folds).members()
     if isinstance(inside, str):
         reason = inside
     else:

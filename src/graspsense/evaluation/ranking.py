@@ -255,7 +255,7 @@ def _measured(
         right[protocol] = answers.right(trials.labels)
         if sets is None:
             rate_of_trials = partial(rate_among, trials, folds=int(folds.max()) + 1)
-            sets = HeldOut.from_trials(trials, answers, folds).set_coverage(rate_of_trials)
+            sets = HeldOut(answers=answers, trials=trials, folds=folds).set_coverage(rate_of_trials)
     return CandidateResult(right=right, training_s=seconds[0], sets=sets)
 
 

@@ -215,13 +215,14 @@ def sets_of(
     instances: Sequence[str] | None,
     certainty: Certainty,
     coverage: float = COVERAGE,
+    unit: str = "instances",
 ) -> PredictionSets:
     """Return the sets that held-out trials calibrate.
 
     `answers` are by models that were trained without the instance of the trial, `labels` the true labels. Without
-    `instances`, each trial is a unit. `certainty` has the classes of support.
+    `instances`, each trial is a unit. `certainty` has the classes of support, `unit` is one of `UNITS`.
     """
-    unit, truth = "trials" if instances is None else "instances", answers.columns_of(labels)
+    truth = answers.columns_of(labels)
     units = np.array([str(i) for i in range(len(truth))] if instances is None else instances)
     needed = units_needed(coverage)
     scores = answers.scores[np.arange(len(truth)), truth]

@@ -1,8 +1,8 @@
 """What differs between the trials of one label and of another besides the object, so that nothing tells which is told.
 
 A label that was always recorded with its own setting, or in its own session, is recognised by that too. So is one that
-was recorded in one stretch while the sensors drifted. How often the object is recognised without it, no held-out trials
-of the same recordings tell.
+was recorded in one stretch, by what changed before the next one. How often the object is recognised without it, no
+held-out trials of the same recordings tell.
 """
 
 from __future__ import annotations
