@@ -117,7 +117,8 @@ def calibrated_with(model: Model, answers: Answers, labelled: Labelled) -> Model
     if isinstance(calibration, str):
         return evolve(model, sets=_no_sets(labelled, calibration))
     certainty, sets = calibration
-    sets = evolve(sets, unknown=int(answers.unlike.sum()), trials=len(labelled))
+    known = answers.known(labelled.labels)
+    sets = evolve(sets, unknown=int(answers.unlike[known].sum()), trials=int(known.sum()))
     return evolve(model, certainty=certainty, sets=sets)
 
 
@@ -159,8 +160,7 @@ class HeldOut:
         if count < units_needed():
             return f"{count} calibration {unit}, {100 * COVERAGE:.0f} % needs {units_needed()}"
         certainty = certainty_of(answers, answers.right(labels), units, effect_of(answers.folds))
-        # Trials of a label that the model of their fold did not know are rightly outside; only these have no score.
-        known = answers.scores[np.arange(len(labels)), answers.columns_of(labels)] > 0.0
+        known = answers.known(labels)  # The others are rightly outside.
         if known.any():
             certainty = evolve(certainty, reach=reach_of(answers.outside[known], np.array(units)[known]))
         return certainty, sets_of(answers, labels, own, certainty, unit=unit)

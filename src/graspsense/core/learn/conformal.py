@@ -214,7 +214,6 @@ def sets_of(
     labels: Sequence[str],
     instances: Sequence[str] | None,
     certainty: Certainty,
-    coverage: float = COVERAGE,
     unit: str = "instances",
 ) -> PredictionSets:
     """Return the sets that held-out trials calibrate.
@@ -224,26 +223,26 @@ def sets_of(
     """
     truth = answers.columns_of(labels)
     units = np.array([str(i) for i in range(len(truth))] if instances is None else instances)
-    needed = units_needed(coverage)
+    needed = units_needed()
     scores = answers.scores[np.arange(len(truth)), truth]
     scores = np.where(answers.columns == truth, NEVER_REACHED, scores)
     thresholds = {}
     for k in np.unique(truth).tolist():
         rows = truth == k
         of_label = len(np.unique(units[rows]))
-        score = calibrated_threshold(scores[rows], units[rows], coverage) if of_label >= needed else None
+        score = calibrated_threshold(scores[rows], units[rows], COVERAGE) if of_label >= needed else None
         thresholds[answers.classes[k]] = LabelThreshold(score=score, units=of_label)
     if all(threshold.score is None for threshold in thresholds.values()):
         most = max((threshold.units for threshold in thresholds.values()), default=0)
-        reason = f"a label has at most {most} calibration {unit}, and {100 * coverage:.0f} % needs {needed}"
-        return PredictionSets(coverage=coverage, unit=unit, thresholds={}, reason=reason)
+        reason = f"a label has at most {most} calibration {unit}, and {100 * COVERAGE:.0f} % needs {needed}"
+        return PredictionSets(coverage=COVERAGE, unit=unit, thresholds={}, reason=reason)
     support_class = certainty.class_of(answers.support)
     of_support = [
-        calibrated_threshold(scores[rows], units[rows], coverage)
+        calibrated_threshold(scores[rows], units[rows], COVERAGE)
         for rows in (support_class == number for number in range(int(support_class.max()) + 1))
     ]
     return PredictionSets(
-        coverage=coverage,
+        coverage=COVERAGE,
         unit=unit,
         thresholds=thresholds,
         # With a single class, the thresholds of the labels suffice.
