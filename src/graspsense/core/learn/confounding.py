@@ -41,8 +41,8 @@ def confounded(labelled: Labelled) -> str:
                 f"all trials of a label have the same {name}: which of both is recognised cannot be told. Record each "
                 f"label with several; a feature can be left out ({option('features', python='columns')})"
             )
-    named = exchangeable_instances(labelled) is not None and not labelled.grouped
-    if in_stretches(labelled) and (not named or _drifts(labelled)):
+    named = None if labelled.grouped else exchangeable_instances(labelled)
+    if _in_stretches(labelled) and (named is None or _drifts(labelled, named)):
         objects = "" if named else f"name several objects of each ({option('instance', 'COLUMN')}), "
         return (
             "each label was recorded in one stretch, or nearly: whether it is recognised by its object, or by what "
@@ -63,7 +63,7 @@ def says_the_label(values: Sequence[Hashable], labels: Sequence[str]) -> bool:
     return 1 < different <= len(pairs) == among < len(labels) and not few
 
 
-def in_stretches(labelled: Labelled) -> bool:
+def _in_stretches(labelled: Labelled) -> bool:
     """Return whether each label is one block in the order of recording, or nearly, as far as that is known.
 
     A label counts as in as many equal stretches as 1 over the sum of the squares of their shares (M. O. Hill, Ecology
@@ -79,10 +79,11 @@ def in_stretches(labelled: Labelled) -> bool:
     return len(squares) > 1 and sum(1.0 / share for share in squares.values()) <= _IN_TURNS * len(squares)
 
 
-def _drifts(labelled: Labelled) -> bool:
+def _drifts(labelled: Labelled, instances: Sequence[str]) -> bool:
     """Return whether the features follow the time within all labels alike. Trials of one instance are as one."""
-    in_time = labelled.rows(np.argsort(np.array(labelled.order), kind="stable"))
-    units = [*zip(in_time.labels, in_time.instances or map(str, range(len(in_time))), strict=True)]
+    order = np.argsort(np.array(labelled.order), kind="stable")
+    in_time = labelled.rows(order)
+    units = [*zip(in_time.labels, np.array(instances)[order], strict=True)]
     _, begins, unit_of = np.unique(units, axis=0, return_index=True, return_inverse=True)
     place_of = np.argsort(np.argsort(begins))[unit_of.ravel()]
     rows = np.argsort(place_of, kind="stable")
