@@ -76,7 +76,8 @@ def calibrated_by(truth, labels, instances=None, right=None, support_class=None)
     scores[np.arange(n), columns] = truth
     predicted = np.where(np.zeros(n, bool) if right is None else right, columns, len(classes) - 1)
     answers = answers_with(scores, predicted, classes, support_class)
-    return sets_of(answers, labels, instances, sure_of(0.0, 1 if support_class is None else 2))
+    certainty = sure_of(0.0, 1 if support_class is None else 2)
+    return sets_of(answers, labels, instances, certainty, unit="trials" if instances is None else "instances")
 
 
 def set_of(sets, scores, label, certainty=1.0, support_class=0):

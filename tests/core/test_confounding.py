@@ -67,8 +67,27 @@ def test_labels_in_one_stretch_each_are_not_told_from_what_changed_between_the_s
         )
         # Several objects of each label show what a mounting of the gripper for each of them changes.
         trials = (turns, drift, steady, evolve(drift, instances=named), evolve(steady, instances=named))
-        told.append([bool(confounded(each)) for each in trials])
-    assert told == [[False, True, True, True, False]] * 20
+        # A single object of each is a name for the label.
+        single = evolve(steady, instances=tuple(map(str, stretches)))
+        told.append([bool(confounded(each)) for each in (*trials, single)])
+    assert told == [[False, True, True, True, False, True]] * 20
+
+
+@every_case(
+    ("order", "in_turns"),
+    [
+        ([(0, 15), (1, 15)], False),
+        ([(0, 15), (1, 15), (0, 1)], False),  # one grasp more of the first label at the end
+        ([(0, 1), (1, 15), (0, 14)], False),
+        ([(0, 15), (1, 1), (0, 1), (1, 14)], False),
+        ([(0, 15), (1, 15), (2, 15), (0, 15)], False),  # only one label was repeated
+        ([(0, 8), (1, 8), (0, 8), (1, 8)], True),
+        ([(0, 40), (1, 1), (0, 60)], True),  # nothing tells of a label with one trial
+    ],
+)
+def test_a_few_grasps_apart_from_the_stretch_of_their_label_are_no_turns(order, in_turns):
+    numbers = np.concatenate([np.repeat(kind, n) for kind, n in order])
+    assert bool(confounded(drifting(numbers, 0.0, np.random.default_rng(0)))) != in_turns
 
 
 def test_objects_that_were_grasped_one_after_the_other_are_no_drift():

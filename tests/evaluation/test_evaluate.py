@@ -157,9 +157,9 @@ def test_drift_can_tell_labels_that_were_recorded_one_after_the_other_and_it_is_
     )
     assert in_blocks.headline.rate > 0.8
     assert not in_blocks.warnings
-    assert any("one block" in note for note in in_blocks.notes)
+    assert any("one stretch" in note for note in in_blocks.notes)
     assert in_turn.headline.rate < 0.7
-    assert not any("one block" in note for note in in_turn.notes)
+    assert not any("one stretch" in note for note in in_turn.notes)
 
 
 def test_instances_that_are_no_other_objects_are_noted():

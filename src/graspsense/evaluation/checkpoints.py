@@ -10,12 +10,13 @@ from attrs import evolve, frozen
 from numpy.typing import NDArray
 
 from graspsense.core.learn.checkpoints import CheckpointTrials
+from graspsense.core.learn.conformal import exchangeable_instances
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.learn.model import Model, checkpoint_model
 from graspsense.core.learn.training import train
 from graspsense.core.settings.selected import SelectedComponent
 from graspsense.evaluation.crossval import cross_validate
-from graspsense.evaluation.doubt import HeldOut, calibrated, calibrated_by, exchangeable_instances
+from graspsense.evaluation.doubt import HeldOut, calibrated, calibrated_by
 from graspsense.evaluation.folds import Folds, held_out, held_out_protocol
 from graspsense.evaluation.intervals import RecognitionRate, rate_among
 
@@ -139,7 +140,7 @@ def _answers(
     for i, label in zip(numbers, pooled.predicted, strict=True):
         predicted[i] = label
     sizes, covered, reason = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.bool_), ""
-    inside = evolve(HeldOut.from_trials(part.labelled, pooled, folds), instances=own).members()
+    inside = HeldOut(answers=pooled, trials=evolve(part.labelled, instances=own), folds=folds).members()
     if isinstance(inside, str):
         reason = inside
     else:

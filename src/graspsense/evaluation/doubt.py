@@ -14,7 +14,7 @@ from graspsense.core.learn.certainty import Certainty, certainty_of
 from graspsense.core.learn.conformal import (
     COVERAGE,
     PredictionSets,
-    can_be_held_out,
+    exchangeable_instances,
     reach_of,
     sets_of,
     units_needed,
@@ -87,7 +87,7 @@ _Calibration = tuple[Certainty, PredictionSets]
 def calibrated(model: Model, learner: ClassifierFactory, labelled: Labelled, seed: int) -> Model:
     """Return a model of these trials with certainty and prediction sets, from cross-validation on them.
 
-    Whole instances are held out where each label has several; otherwise each trial is a unit.
+    Whole instances are held out where most labels have several; otherwise each trial is a unit.
     """
     try:
         folds = held_out(labelled.labels, exchangeable_instances(labelled), FOLDS, seed)
@@ -112,12 +112,13 @@ def calibrated_with(model: Model, answers: Answers, labelled: Labelled) -> Model
 
     It has neither where these trials show that labels cannot be told from how they were recorded.
     """
-    held = HeldOut.from_trials(labelled, answers)
+    held = HeldOut(answers=answers, trials=labelled, folds=np.arange(len(labelled)))
     calibration = confounded(labelled) or held.calibration(np.arange(len(labelled)))
     if isinstance(calibration, str):
         return evolve(model, sets=_no_sets(labelled, calibration))
     certainty, sets = calibration
-    sets = evolve(sets, unit=held.unit, unknown=int(answers.unlike.sum()), trials=len(labelled))
+    known = answers.known(labelled.labels)
+    sets = evolve(sets, unknown=int(answers.unlike[known].sum()), trials=int(known.sum()))
     return evolve(model, certainty=certainty, sets=sets)
 
 
@@ -132,60 +133,37 @@ def _unit(labelled: Labelled) -> str:
     return "sessions" if labelled.sessions else "groups" if labelled.grouped else "instances"
 
 
-def exchangeable_instances(labelled: Labelled) -> tuple[str, ...] | None:
-    """Return the instances of the trials; None if they are not known, or named ones cannot be held out."""
-    if labelled.instances is None or labelled.grouped:
-        return labelled.instances
-    named = {*zip(labelled.labels, labelled.instances, strict=True)}
-    return labelled.instances if can_be_held_out(named) else None
-
-
 @frozen(kw_only=True, eq=False)
 class HeldOut:
     """Answers for held-out trials with their true labels: what every figure of certainty is computed from.
 
-    `instances` are those that were held out, if any, and `unit` what they are, one of `conformal.UNITS`. What is said
-    of the trials of a fold is calibrated with the other folds that were trained for it (`folds.splits`).
+    Units are the instances of `trials` that can be held out, or single trials. What is said of the trials of a fold is
+    calibrated with the other folds that were trained for it (`folds.splits`).
     """
 
     answers: Answers
-    labels: Sequence[str]
-    instances: Sequence[str] | None
-    unit: str
+    trials: Labelled
     folds: Folds
     within: NDArray[np.int64] | None = None
-
-    @classmethod
-    def from_trials(cls, labelled: Labelled, answers: Answers, folds: Folds | None = None) -> HeldOut:
-        """Return the answers for these trials, in folds of their instances where each label has several."""
-        return cls(
-            answers=answers,
-            labels=labelled.labels,
-            instances=exchangeable_instances(labelled),
-            unit=_unit(labelled),
-            folds=np.arange(len(labelled)) if folds is None else folds,
-        )
 
     def calibration(self, rows: NDArray[np.int64]) -> _Calibration | str:
         """Return what these trials tell, or the reason why they have too few units for anything."""
         answers, numbers = self.answers.rows(rows), rows.tolist()
-        labels = [self.labels[i] for i in numbers]
-        own = None if self.instances is None else [self.instances[i] for i in numbers]
+        labels, named = [self.trials.labels[i] for i in numbers], exchangeable_instances(self.trials)
+        own = None if named is None else [named[i] for i in numbers]
         # An instance may have several labels, such as a bottle in each of its states: these are answers of their own.
         units = [
             str(i) if own is None else f"{label} {own[k]}"
             for k, (i, label) in enumerate(zip(numbers, labels, strict=True))
         ]
-        count = len(set(units if own is None else own))
+        count, unit = len(set(units if own is None else own)), _unit(self.trials)
         if count < units_needed():
-            unit = "trials" if own is None else "instances"
             return f"{count} calibration {unit}, {100 * COVERAGE:.0f} % needs {units_needed()}"
         certainty = certainty_of(answers, answers.right(labels), units, effect_of(answers.folds))
-        # Trials of a label that the model of their fold did not know are rightly outside; only these have no score.
-        known = answers.scores[np.arange(len(labels)), answers.columns_of(labels)] > 0.0
+        known = answers.known(labels)  # The others are rightly outside.
         if known.any():
             certainty = evolve(certainty, reach=reach_of(answers.outside[known], np.array(units)[known]))
-        return certainty, sets_of(answers, labels, own, certainty)
+        return certainty, sets_of(answers, labels, own, certainty, unit=unit)
 
     def members(self) -> NDArray[np.bool_] | str:
         """Return which labels belong to the set of each trial, shape (trials, classes), or why there are no sets."""
@@ -206,9 +184,9 @@ class HeldOut:
         The model of a fold does not know the instances that it is tested on. The thresholds do indirectly: the models
         of the other folds were trained on them.
         """
-        labels, inside = self.labels, self.members()
+        labels, unit, inside = self.trials.labels, _unit(self.trials), self.members()
         if isinstance(inside, str):
-            return SetCoverage(asked=COVERAGE, unit=self.unit, reason=inside)
+            return SetCoverage(asked=COVERAGE, unit=unit, reason=inside)
         covered = inside[np.arange(len(labels)), self.answers.columns_of(labels)].tolist()
         sizes = inside.sum(axis=1)
         rows_of = {
@@ -218,7 +196,7 @@ class HeldOut:
         below = [i for row in rows_of.values() if right[row].mean() < COVERAGE for i in row]
         return SetCoverage(
             asked=COVERAGE,
-            unit=self.unit,
+            unit=unit,
             covered=rate_of(covered, None),
             covered_below=rate_of(covered, sorted(below)) if below else None,
             by_label={name: rate_of(covered, row) for name, row in rows_of.items()},
@@ -228,14 +206,15 @@ class HeldOut:
 
     def reliability(self, rate_of: RateOf) -> Reliability:
         """Return how well the probabilities, calibrated as a model gives them, agree with the rate."""
-        answers, probabilities = self.answers, self.answers.probabilities.copy()
+        answers, labels = self.answers, self.trials.labels
+        probabilities = answers.probabilities.copy()
         for test, others in splits(self.folds, self.within):
             calibration = self.calibration(others)
             if not isinstance(calibration, str):
                 probabilities[test] = calibration[0].probabilities(answers.rows(test))
         given = np.nan_to_num(probabilities, nan=0.0)
-        truth = np.array(self.labels)[:, np.newaxis] == np.array(answers.classes)
-        right = answers.right(self.labels)
+        truth = np.array(labels)[:, np.newaxis] == np.array(answers.classes)
+        right = answers.right(labels)
         curve = _bins(given, right, rate_of)
         return Reliability(
             brier=float(((given - truth) ** 2).sum(axis=1).mean()),

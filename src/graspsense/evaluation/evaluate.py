@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from graspsense.core.learn.confounding import in_stretches
+from graspsense.core.learn.confounding import confounded
 from graspsense.core.learn.labelled import TARGETS, Labelled, Target, class_of
 from graspsense.core.settings.selected import select_component
 from graspsense.core.values.errors import ConfigError, counted
@@ -136,7 +136,8 @@ def notes_on(trials: Labelled, k: int) -> Iterator[str]:
     """Yield what a reader must know of these trials, which are evaluated in `k` folds."""
     yield from _on_small_labels(trials, k)
     yield from _on_instances(trials)
-    yield from _on_blocks(trials)
+    if why := confounded(trials):
+        yield why
 
 
 def _on_small_labels(trials: Labelled, k: int) -> Iterator[str]:
@@ -168,14 +169,4 @@ def _on_instances(trials: Labelled) -> Iterator[str]:
         yield (
             f"instances that differ in spelling only count as two: {alike_words(pairs)}. If they are one object, its "
             "grasps are in training and test"
-        )
-
-
-def _on_blocks(trials: Labelled) -> Iterator[str]:
-    """Note that drift can tell recorded labels, and that no control shows it, where each label is one block."""
-    if in_stretches(trials):
-        yield (
-            "in the order of recording, the trials of each label are one block: what changes with time, such as a "
-            "temperature or the zero of a sensor, may tell the labels, and recording_order cannot show it. Grasp "
-            "the objects in turn"
         )

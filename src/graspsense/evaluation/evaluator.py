@@ -128,7 +128,7 @@ class Evaluator:
         """Return the predictions of the headline, with the instances that its folds hold out, if they hold out any."""
         named = headline.protocol == self.held_out_name
         trials = self.trials if named else evolve(self.trials, instances=None)
-        return evolve(HeldOut.from_trials(trials, headline.pooled, headline.folds), within=self.within)
+        return HeldOut(answers=headline.pooled, trials=trials, folds=headline.folds, within=self.within)
 
     def by_features(self, pooled: Answers) -> dict[str, RecognitionRate]:
         """Return the rates among trials with features and without any; nothing if all trials have features."""

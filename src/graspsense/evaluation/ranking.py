@@ -15,12 +15,13 @@ from typing import Final, Literal
 import numpy as np
 from attrs import evolve, frozen
 
+from graspsense.core.learn.conformal import exchangeable_instances
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.features import FeatureTable
 from graspsense.evaluation.chosen import ChosenRate, comparisons_of, rate_of_chosen
 from graspsense.evaluation.crossval import ClassifierFactory, FitRefused, cross_validate
-from graspsense.evaluation.doubt import HeldOut, SetCoverage, exchangeable_instances
+from graspsense.evaluation.doubt import HeldOut, SetCoverage
 from graspsense.evaluation.folds import (
     Folds,
     commonest,
@@ -254,7 +255,7 @@ def _measured(
         right[protocol] = answers.right(trials.labels)
         if sets is None:
             rate_of_trials = partial(rate_among, trials, folds=int(folds.max()) + 1)
-            sets = HeldOut.from_trials(trials, answers, folds).set_coverage(rate_of_trials)
+            sets = HeldOut(answers=answers, trials=trials, folds=folds).set_coverage(rate_of_trials)
     return CandidateResult(right=right, training_s=seconds[0], sets=sets)
 
 

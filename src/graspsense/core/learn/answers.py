@@ -62,6 +62,10 @@ class Answers:
         """Return the column of each of these labels."""
         return np.array([self.classes.index(label) for label in labels], dtype=np.int64)
 
+    def known(self, labels: Sequence[str]) -> NDArray[np.bool_]:
+        """Return which trials, with these labels, have one that their model learned; only others have no score."""
+        return self.scores[np.arange(len(labels)), self.columns_of(labels)] > 0.0
+
     def rows(self, which: NDArray[np.int64] | NDArray[np.bool_]) -> Answers:
         """Return the answers to these trials."""
         return evolve(

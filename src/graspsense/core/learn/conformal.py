@@ -34,6 +34,8 @@ from graspsense.core.learn.stored_values import StoredValues
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from graspsense.core.learn.labelled import Labelled
+
 COVERAGE: Final = 0.9
 """Share of the trials whose set shall contain the true label."""
 WITHIN_REACH: Final = 0.98
@@ -90,6 +92,14 @@ def can_be_held_out(named: Iterable[tuple[str, str | None]]) -> bool:
     """
     of_label = Counter(label for label, _ in named)
     return 2 * sum(instances > 1 for instances in of_label.values()) > len(of_label)
+
+
+def exchangeable_instances(labelled: Labelled) -> tuple[str, ...] | None:
+    """Return the instances of the trials; None if they are not known, or named ones cannot be held out."""
+    if labelled.instances is None or labelled.grouped:
+        return labelled.instances
+    named = {*zip(labelled.labels, labelled.instances, strict=True)}
+    return labelled.instances if can_be_held_out(named) else None
 
 
 @frozen(kw_only=True)
@@ -204,35 +214,35 @@ def sets_of(
     labels: Sequence[str],
     instances: Sequence[str] | None,
     certainty: Certainty,
-    coverage: float = COVERAGE,
+    unit: str = "instances",
 ) -> PredictionSets:
     """Return the sets that held-out trials calibrate.
 
     `answers` are by models that were trained without the instance of the trial, `labels` the true labels. Without
-    `instances`, each trial is a unit. `certainty` has the classes of support.
+    `instances`, each trial is a unit. `certainty` has the classes of support, `unit` is one of `UNITS`.
     """
-    unit, truth = "trials" if instances is None else "instances", answers.columns_of(labels)
+    truth = answers.columns_of(labels)
     units = np.array([str(i) for i in range(len(truth))] if instances is None else instances)
-    needed = units_needed(coverage)
+    needed = units_needed()
     scores = answers.scores[np.arange(len(truth)), truth]
     scores = np.where(answers.columns == truth, NEVER_REACHED, scores)
     thresholds = {}
     for k in np.unique(truth).tolist():
         rows = truth == k
         of_label = len(np.unique(units[rows]))
-        score = calibrated_threshold(scores[rows], units[rows], coverage) if of_label >= needed else None
+        score = calibrated_threshold(scores[rows], units[rows], COVERAGE) if of_label >= needed else None
         thresholds[answers.classes[k]] = LabelThreshold(score=score, units=of_label)
     if all(threshold.score is None for threshold in thresholds.values()):
         most = max((threshold.units for threshold in thresholds.values()), default=0)
-        reason = f"a label has at most {most} calibration {unit}, and {100 * coverage:.0f} % needs {needed}"
-        return PredictionSets(coverage=coverage, unit=unit, thresholds={}, reason=reason)
+        reason = f"a label has at most {most} calibration {unit}, and {100 * COVERAGE:.0f} % needs {needed}"
+        return PredictionSets(coverage=COVERAGE, unit=unit, thresholds={}, reason=reason)
     support_class = certainty.class_of(answers.support)
     of_support = [
-        calibrated_threshold(scores[rows], units[rows], coverage)
+        calibrated_threshold(scores[rows], units[rows], COVERAGE)
         for rows in (support_class == number for number in range(int(support_class.max()) + 1))
     ]
     return PredictionSets(
-        coverage=coverage,
+        coverage=COVERAGE,
         unit=unit,
         thresholds=thresholds,
         # With a single class, the thresholds of the labels suffice.

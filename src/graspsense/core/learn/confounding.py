@@ -1,8 +1,8 @@
 """What differs between the trials of one label and of another besides the object, so that nothing tells which is told.
 
 A label that was always recorded with its own setting, or in its own session, is recognised by that too. So is one that
-was recorded in one stretch while the sensors drifted. How often the object is recognised without it, no held-out trials
-of the same recordings tell.
+was recorded in one stretch, by what changed before the next one. How often the object is recognised without it, no
+held-out trials of the same recordings tell.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from graspsense.core.components.caller import option
+from graspsense.core.learn.conformal import exchangeable_instances
 from graspsense.core.learn.groups import beyond_chance, means_of
 
 if TYPE_CHECKING:
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
 
 LEAST_LINES: Final = 5
 """Trials from which on their values can show more than chance."""
+_IN_TURNS: Final = 1.5
+"""Mean number of equal stretches of a label above which labels are in turns: two of each, or of more than half."""
 _DRIFT: Final = 5.0
 """Standard deviations by which features follow the time within all labels more than in random order, if they drift."""
 
@@ -38,12 +41,13 @@ def confounded(labelled: Labelled) -> str:
                 f"all trials of a label have the same {name}: which of both is recognised cannot be told. Record each "
                 f"label with several; a feature can be left out ({option('features', python='columns')})"
             )
-    named = labelled.instances is not None and not labelled.grouped
-    if in_stretches(labelled) and (not named or _drifts(labelled)):
+    named = None if labelled.grouped else exchangeable_instances(labelled)
+    if _in_stretches(labelled) and (named is None or _drifts(labelled, named)):
+        objects = "" if named else f"name several objects of each ({option('instance', 'COLUMN')}), "
         return (
-            "each label was recorded in one stretch: whether it is recognised by its object, or by what changed from "
-            "one stretch to the next, as a drift or a mounting, cannot be told. Record the labels in turns"
-            + ("" if named else f", or name several objects of each ({option('instance', 'COLUMN')})")
+            "each label was recorded in one stretch, or nearly: whether it is recognised by its object, or by what "
+            "changed from one stretch to the next, as a drift or a mounting, cannot be told. Record the labels in "
+            f"turns, {objects}or state the order of a table that was sorted later ({option('order', 'COLUMN')})"
         )
     return ""
 
@@ -59,18 +63,27 @@ def says_the_label(values: Sequence[Hashable], labels: Sequence[str]) -> bool:
     return 1 < different <= len(pairs) == among < len(labels) and not few
 
 
-def in_stretches(labelled: Labelled) -> bool:
-    """Return whether the trials of each label are one block in the order of recording, as far as that is known."""
+def _in_stretches(labelled: Labelled) -> bool:
+    """Return whether each label is one block in the order of recording, or nearly, as far as that is known.
+
+    A label counts as in as many equal stretches as 1 over the sum of the squares of their shares (M. O. Hill, Ecology
+    54 (1973) 427): a grasp apart from its others hardly makes a second one. A label with one trial shows nothing.
+    """
     if labelled.order is None or labelled.provenance.get("simulated"):
         return False
     in_time = [labelled.labels[row] for row in np.argsort(labelled.order, kind="stable").tolist()]
-    return sum(1 for _ in groupby(in_time)) == len(labelled.classes) < len(in_time)
+    trials = Counter(in_time)
+    squares = dict.fromkeys((label for label, n in trials.items() if n > 1), 0.0)
+    for label, stretch in groupby(label for label in in_time if label in squares):
+        squares[label] += (len(list(stretch)) / trials[label]) ** 2
+    return len(squares) > 1 and sum(1.0 / share for share in squares.values()) <= _IN_TURNS * len(squares)
 
 
-def _drifts(labelled: Labelled) -> bool:
+def _drifts(labelled: Labelled, instances: Sequence[str]) -> bool:
     """Return whether the features follow the time within all labels alike. Trials of one instance are as one."""
-    in_time = labelled.rows(np.argsort(np.array(labelled.order), kind="stable"))
-    units = [*zip(in_time.labels, in_time.instances or map(str, range(len(in_time))), strict=True)]
+    order = np.argsort(np.array(labelled.order), kind="stable")
+    in_time = labelled.rows(order)
+    units = [*zip(in_time.labels, np.array(instances)[order], strict=True)]
     _, begins, unit_of = np.unique(units, axis=0, return_index=True, return_inverse=True)
     place_of = np.argsort(np.argsort(begins))[unit_of.ravel()]
     rows = np.argsort(place_of, kind="stable")

@@ -227,7 +227,7 @@ class Model:
         if self.certainty is None or self.certainty.of_label is None or label in self.certainty.of_label:
             return ""
         unit = "trials" if self.sets is None else self.sets.unit
-        return f"fewer than {LABEL_UNITS} held-out {unit} were called {label}"
+        return f"fewer than {LABEL_UNITS} held-out {unit} were called {label}: it needs more {unit}"
 
     def answers(self, table: FeatureTable) -> Answers:
         """Return the answers for the trials of a table, which are not calibrated.
