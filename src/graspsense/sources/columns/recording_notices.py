@@ -209,7 +209,7 @@ def _runs(values: Numbers) -> list[tuple[int, int]]:
 def _of_sensor(force: _Force) -> Iterator[str]:
     """Yield that a force was not measured, or not all the time."""
     if len(force) > 2 and not np.ptp(force.n):
-        yield f"{force.what} does not change during the recording: is it another column, or did its sensor stop?"
+        yield f"{force.what} does not change during the recording: is it another column, did its sensor stop, or did the fingers touch nothing?"
     elif len(force) >= FEWEST and (held := _held(force.n)) is not None:
         begin, end = held
         repeats = "its last value to the end"
@@ -284,7 +284,8 @@ def _numb(pad: _Force, other: _Force) -> Iterator[str]:
     loaded = other_n > other.low + LOADED * span
     begin, noise = int(loaded.argmax()), noise / math.sqrt(width)
     free = other_n[:begin] < other.low + PART * span + noise
-    if not free.any() or width > np.count_nonzero(loaded):
+    # Without an object, the mean of noise has a small part of its range.
+    if not free.any() or width > np.count_nonzero(loaded) or np.ptp(other_n) < LOADED * span:
         return
     zero = float(np.median(felt_n[:begin][free]))
     away = np.abs(felt_n - zero)
@@ -365,8 +366,8 @@ def _falls_at_once(force: _Force) -> Iterator[str]:
     k = _leap(-steps, closed[1:], max(FREE * force.span, force.noise))
     if k is None or steps.max() > LOADED * -steps[k - 1]:
         return
-    opened = np.flatnonzero(~closed[k:])[:1] + k
-    if float(np.ptp(course[k : opened[0] if len(opened) else None])) > FREE * force.span:
+    fallen = course[k:][np.logical_and.accumulate(closed[k:])]
+    if (fallen - np.minimum.accumulate(fallen)).max(initial=0.0) > FREE * force.span:
         yield (
             f"the force falls by {force.amount(course[k - 1] - course[k])} at once at {force.when(k)}, and then grows "
             "again in the closed fingers: did the object break or slip, or was the zero of the sensor set under a load?"
@@ -400,6 +401,8 @@ def _glitches(force: _Force) -> Iterator[str]:
     if len(sampled) < FEWEST:
         return
     step_s, span = float(np.median(np.diff(t))), float(np.ptp(sampled))
+    # A single value of noise bends the force by twice as much as it is away.
+    noise = max(LEAP * np.median(np.abs(np.diff(sampled, 2))), 0.5 * BEND * (resolution(sampled) or 0.0))
     left = np.zeros(len(sampled), dtype=np.bool_)
     # Under a load, nothing exceeds all other forces several times and then comes back, however rarely it is measured.
     for samples, longest_s, free_share, loaded_share in (
@@ -409,7 +412,7 @@ def _glitches(force: _Force) -> Iterator[str]:
         course = median_course(sampled, min(samples, int(longest_s / step_s)))
         apart, free = np.abs(sampled - course), course < course.min() + PART * np.ptp(course)
         loaded_share *= np.ptp(course) if loaded_share == FAR else 1.0
-        left |= (apart > np.where(free, free_share, loaded_share)) & (apart > NOISE * np.median(apart))
+        left |= apart > np.maximum(np.where(free, free_share, loaded_share), max(NOISE * np.median(apart), noise))
     count, k = int(left.sum()), int(np.argmax(left))
     if 0 < count <= MOST_GLITCHES * len(sampled):
         others = f", and {count - 1} more" if count > 1 else ""
@@ -497,13 +500,15 @@ def _late(force: _Force, *, doubtful: bool) -> Iterator[str]:
         return
     begin, pressed, span = int(free[free < loaded[0]].max(initial=0)), int(loaded[0]), float(np.ptp(gap))
     end = int(free[free > pressed].min(initial=len(t)))
-    narrowest, noise = float(gap[begin:end].min()), NOISE * float(np.median(np.abs(np.diff(force.gap, 2))))
+    narrowest, bends = float(gap[begin:end].min()), np.abs(np.diff(force.gap, 2))
+    # The steps of a coarse gap that moves are no noise.
+    noise = NOISE * float(np.median(bends[max(begin - 1, 0) : end]))
     travel = float(gap[begin]) - narrowest
     still = max(SLIGHT * travel, noise, LEAP * (resolution(force.gap) or 0.0))
     rests = gap <= narrowest + (still if travel > still else noise)
     came = int(rests[:end].argmax())
     least_s = max(
-        LATE_S, *(2.0 * period_s(t, values) for values in (t, force.gap, force.n) if np.ptp(values))
+        LATE_S, *(2.5 * period_s(t, values) for values in (t, force.gap, force.n) if np.ptp(values))
     )
     stays = np.flatnonzero((gap[came:end] > gap[begin] + SLIGHT * span) & (n[came:end] > LOADED * force.span))
     if travel > still:
@@ -511,7 +516,8 @@ def _late(force: _Force, *, doubtful: bool) -> Iterator[str]:
         later, begins_s = np.flatnonzero(rests[came:end] & (n[came:end] > explained)), 0.0
     else:
         later = np.flatnonzero(n[came:pressed] < SLIGHT * force.span)
-        begins_s = LOADED * float(t[pressed] - t[begin])
+        # They can still close by a step of the gap.
+        begins_s = LOADED * float(t[pressed] - t[begin]) + period_s(t[:came], gap[:came])
     opens = end - 1 + int((gap[end - 1 :] > narrowest + 0.5 * SLIGHT * span).argmax())
     late_s = float(t[opens] - t[end - 1])
     around_s = t[begin] + late_s * np.arange(-1, 2)
