@@ -209,7 +209,7 @@ def _runs(values: Numbers) -> list[tuple[int, int]]:
 def _of_sensor(force: _Force) -> Iterator[str]:
     """Yield that a force was not measured, or not all the time."""
     if len(force) > 2 and not np.ptp(force.n):
-        yield f"{force.what} does not change during the recording: is it another column, did its sensor stop, or did the fingers touch nothing?"
+        yield f"{force.what} does not change: is it another column, did its sensor stop, or was nothing touched?"
     elif len(force) >= FEWEST and (held := _held(force.n)) is not None:
         begin, end = held
         repeats = "its last value to the end"
@@ -402,7 +402,7 @@ def _glitches(force: _Force) -> Iterator[str]:
         return
     step_s, span = float(np.median(np.diff(t))), float(np.ptp(sampled))
     # A single value of noise bends the force by twice as much as it is away.
-    noise = max(LEAP * np.median(np.abs(np.diff(sampled, 2))), 0.5 * BEND * (resolution(sampled) or 0.0))
+    noise = max(LEAP * np.median(np.abs(np.diff(sampled, 2))), BEND / 2.0 * (resolution(sampled) or 0.0))
     left = np.zeros(len(sampled), dtype=np.bool_)
     # Under a load, nothing exceeds all other forces several times and then comes back, however rarely it is measured.
     for samples, longest_s, free_share, loaded_share in (
@@ -412,13 +412,14 @@ def _glitches(force: _Force) -> Iterator[str]:
         course = median_course(sampled, min(samples, int(longest_s / step_s)))
         apart, free = np.abs(sampled - course), course < course.min() + PART * np.ptp(course)
         loaded_share *= np.ptp(course) if loaded_share == FAR else 1.0
-        left |= apart > np.maximum(np.where(free, free_share, loaded_share), max(NOISE * np.median(apart), noise))
+        left |= apart > np.where(free, free_share, loaded_share).clip(max(NOISE * np.median(apart), noise))
     count, k = int(left.sum()), int(np.argmax(left))
     if 0 < count <= MOST_GLITCHES * len(sampled):
         others = f", and {count - 1} more" if count > 1 else ""
         yield (
             f"{force.what} leaves its course for a moment ({force.amount(sampled[k], '.4g')} at {t[k]:.4g} s{others}): "
-            "if that is a glitch, take it out, since it can pass for a contact or a rest"
+            "if it is no impact, no break and no current of a drive that starts, take it out, since a glitch can pass "
+            "for a contact or a rest"
         )
 
 
@@ -477,7 +478,7 @@ def _bump(force: _Force) -> Iterator[str]:
         yield (
             f"a force comes at {force.when(begin)} and is gone at {force.when(end)}, the fingers close by "
             f"{closes * 1e3:.3g} mm more, and it comes back at {force.when(again)}: the contact is the first of these. "
-            "If the fingers touched something on their way, cut that out; or the object broke"
+            "If it is something on their way, or the current with which a drive starts, cut it out; or the object broke"
         )
     elif not glitch and gap[begin] - gap[pressed] > LOADED * np.ptp(gap):
         yield (
@@ -500,11 +501,12 @@ def _late(force: _Force, *, doubtful: bool) -> Iterator[str]:
         return
     begin, pressed, span = int(free[free < loaded[0]].max(initial=0)), int(loaded[0]), float(np.ptp(gap))
     end = int(free[free > pressed].min(initial=len(t)))
-    narrowest, bends = float(gap[begin:end].min()), np.abs(np.diff(force.gap, 2))
+    narrowest, step = float(gap[begin:end].min()), resolution(force.gap) or 0.0
+    bends = np.abs(np.diff(force.gap, 2))
     # The steps of a coarse gap that moves are no noise.
-    noise = NOISE * float(np.median(bends[max(begin - 1, 0) : end]))
+    noise = NOISE * float(np.median(bends * (bends > BEND * step)))
     travel = float(gap[begin]) - narrowest
-    still = max(SLIGHT * travel, noise, LEAP * (resolution(force.gap) or 0.0))
+    still = max(SLIGHT * travel, noise, LEAP * step)
     rests = gap <= narrowest + (still if travel > still else noise)
     came = int(rests[:end].argmax())
     least_s = max(
@@ -540,8 +542,8 @@ def _late(force: _Force, *, doubtful: bool) -> Iterator[str]:
         grown = 100.0 * float(n[begin:end].max() - n[came]) / force.span
         yield (
             f"{force.what} grows by {grown:.0f} % of its range after {force.when(came)}, while the fingers rest: does "
-            "it come late, was it smoothed, is it the current of a drive with friction, or is something hard in a soft "
-            "layer? If it is late, a contact is too"
+            "it come late, was it smoothed, does the drive press on (a servo, or the current of one with friction), or "
+            "is something hard in a soft layer, or left of what broke? If it is late, a contact is too"
         )
 
 
