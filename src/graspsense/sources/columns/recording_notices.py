@@ -20,7 +20,7 @@ from graspsense.core.control.contact import CONTACT_FORCE_N
 from graspsense.core.values.fingers import FingerForce
 from graspsense.recording.labelled_recording import LabelledRecording
 from graspsense.recording.replayable import Recording
-from graspsense.sources.columns.channel_facts import resolution, usual_range
+from graspsense.sources.columns.channel_facts import period_s, resolution, usual_range
 from graspsense.sources.formats.table import Numbers
 
 FEWEST: Final = 20
@@ -140,17 +140,14 @@ def signal_notices(recording: Recording) -> Iterator[str]:
     """
     t, gap, left, right = columns = recording.columns("t_s", "gap_m", "force_left_n", "force_right_n")
     columns[~np.isfinite(columns)] = np.nan
-    measured = [np.isfinite(signal) for signal in (gap, left, right)]
-    known = np.logical_and.reduce([finite for finite in measured if finite.any()] or measured)
-    pads = force_of_pads(left, right)
-    forces = [
+    measured = [signal for signal in (gap, left, right) if np.isfinite(signal).any()]
+    known = np.isfinite([t, *measured]).all(axis=0)
+    pads = [
         _Force(what, t[known], gap[known], force[known], recording.units)
-        for what, force in pads.items()
-        if np.isfinite(force).any()
+        for what, force in force_of_pads(left, right).items()
     ]
-    silent = [what for what, force in pads.items() if len(t) > 1 and not np.isfinite(force).any()]
-    told = [f"{what} has no number: was the sensor connected?" for what in silent]
-    told += [text for force in forces for text in _of_sensor(force)]
+    forces = [pad for pad in pads if np.isfinite(pad.n).all()]
+    told = [text for pad in pads for text in _of_sensor(pad)]
     if int(known.sum()) < FEWEST or not forces:
         yield from told
         return
@@ -208,13 +205,14 @@ def _runs(values: Numbers) -> list[tuple[int, int]]:
 
 def _of_sensor(force: _Force) -> Iterator[str]:
     """Yield that a force was not measured, or not all the time."""
-    if len(force) > 2 and not np.ptp(force.n):
+    if len(force) > 1 and np.isnan(force.n).all():
+        yield f"{force.what} has no number: was the sensor connected?"
+    elif len(force) > 2 and not np.ptp(force.n):
         yield f"{force.what} does not change: is it another column, did its sensor stop, or was nothing touched?"
     elif len(force) >= FEWEST and (held := _held(force.n)) is not None:
         begin, end = held
-        repeats = "its last value to the end"
-        if end < len(force):
-            repeats = f"one value from {force.t[begin]:.4g} to {force.when(end - 1)}"
+        stays = f"one value from {force.t[begin]:.4g} to {force.when(end - 1)}"
+        repeats = stays if end < len(force) else "its last value to the end"
         yield (
             f"{force.what} repeats {repeats}, although it varied before: did its sensor stop, or is it "
             "at the end of its range?"
@@ -225,10 +223,9 @@ def _of_sensor(force: _Force) -> Iterator[str]:
 
 def _filled(signal: _Force) -> Iterator[str]:
     """Yield that a signal with noise is a straight line while it changes, as between samples that were missing."""
-    bends = _bends(signal.n)
     if not signal.noise > NOISE * FINE * (resolution(signal.n) or np.inf):
         return
-    for begin, end in pairwise([0, *(bends + 1).tolist(), len(signal) - 1]):
+    for begin, end in pairwise([0, *(_bends(signal.n) + 1).tolist(), len(signal) - 1]):
         if end - begin >= LINE and abs(signal.n[end] - signal.n[begin]) > PART * signal.span:
             yield (
                 f"{signal.what} is a straight line from {signal.t[begin]:.4g} to {signal.when(end)}, although it has "
@@ -290,10 +287,9 @@ def _numb(pad: _Force, other: _Force) -> Iterator[str]:
     zero = float(np.median(felt_n[:begin][free]))
     away = np.abs(felt_n - zero)
     loaded &= pad.gap <= pad.gap[begin]
-    numb, felt = loaded & (away < max(noise, SLIGHT * span)), np.flatnonzero(away > FREE * span)
+    numb, felt = loaded & (away < max(noise, SLIGHT * span)), away > FREE * span
     if np.count_nonzero(numb) < max(FEWEST, PART * np.count_nonzero(loaded)):
-        numb[: felt[0] + 1 if len(felt) else None] = False
-        numb[felt[-1] if len(felt) else 0 :] = False
+        numb &= np.logical_or.accumulate(felt) & np.logical_or.accumulate(felt[::-1])[::-1]
     if np.count_nonzero(numb) > GLITCH_SAMPLES:
         from_k, until_k = np.flatnonzero(numb)[[0, -1]].tolist()
         yield (
@@ -383,8 +379,7 @@ def _rough(force: _Force) -> Iterator[str]:
     steps = np.diff(np.unique(force.n))
     counts = steps / steps.min()
     if varies > SLIGHT:
-        share = f"{100 * varies:.0f} %"
-        yield f"{force.what} varies by {share} of its range around its course, and so does each feature of it"
+        yield f"{force.what} varies by {100 * varies:.0f} % of its range around its course, and so do its features"
     elif steps.min() > PART * force.span and np.allclose(counts, np.round(counts)):
         yield (
             f"{force.what} has steps of {100 * steps.min() / force.span:.0f} % of its range: each value is up to half "
@@ -509,17 +504,16 @@ def _late(force: _Force, *, doubtful: bool) -> Iterator[str]:
     still = max(SLIGHT * travel, noise, LEAP * step)
     rests = gap <= narrowest + (still if travel > still else noise)
     came = int(rests[:end].argmax())
-    least_s = max(
-        LATE_S, *(2.5 * period_s(t, values) for values in (t, force.gap, force.n) if np.ptp(values))
-    )
+    least_s = max(LATE_S, *(2.5 * period_s(t, values) for values in (t, force.gap, force.n)))
     stays = np.flatnonzero((gap[came:end] > gap[begin] + SLIGHT * span) & (n[came:end] > LOADED * force.span))
     if travel > still:
         explained = n[: came + 1].max() + (CREEP + 2.0 * still / travel) * force.span
-        later, begins_s = np.flatnonzero(rests[came:end] & (n[came:end] > explained)), 0.0
+        later, begins_s = t[came:end][rests[came:end] & (n[came:end] > explained)], 0.0
     else:
-        later = np.flatnonzero(n[came:pressed] < SLIGHT * force.span)
+        later = t[came:pressed][n[came:pressed] < SLIGHT * force.span]
         # They can still close by a step of the gap.
         begins_s = LOADED * float(t[pressed] - t[begin]) + period_s(t[:came], gap[:came])
+    lasts_s = float(later[-1] - later[0]) if len(later) else 0.0
     opens = end - 1 + int((gap[end - 1 :] > narrowest + 0.5 * SLIGHT * span).argmax())
     late_s = float(t[opens] - t[end - 1])
     around_s = t[begin] + late_s * np.arange(-1, 2)
@@ -536,9 +530,7 @@ def _late(force: _Force, *, doubtful: bool) -> Iterator[str]:
             f"the fingers go on as fast after the force begins (at {force.when(begin)}), and open {late_s:.2g} s "
             "after it is gone: does the gap come late?"
         )
-    elif (
-        not doubtful and came and len(later) and t[came + later[-1]] - t[came + later[0]] > least_s + begins_s
-    ):
+    elif not doubtful and came and lasts_s > least_s + begins_s:
         grown = 100.0 * float(n[begin:end].max() - n[came]) / force.span
         yield (
             f"{force.what} grows by {grown:.0f} % of its range after {force.when(came)}, while the fingers rest: does "
@@ -547,20 +539,14 @@ def _late(force: _Force, *, doubtful: bool) -> Iterator[str]:
         )
 
 
-def period_s(t_s: Numbers, signal: Numbers) -> float:
-    """Return the usual time (s) between two new values of a signal, infinite if it has none."""
-    new = np.diff(t_s[np.flatnonzero(np.diff(signal))])
-    return float(np.median(new)) if len(new) else np.inf
-
-
 def _gap_leaps(t_s: Numbers, gap: Numbers) -> Iterator[str]:
     """Yield that a gap (m) leaps faster (s) than fingers move, or has new values so rarely that it changes by much."""
-    steps, changes = np.abs(np.diff(gap)), np.flatnonzero(np.diff(gap))
-    if len(changes) >= FEWEST:
+    steps = np.abs(np.diff(gap))
+    if np.count_nonzero(steps) >= FEWEST:
         k, usual = int(steps.argmax()), float(np.sort(steps)[-3])
         seconds = max(float(np.diff(t_s)[k]), float(np.median(np.diff(t_s))))
         # A gap that is measured more rarely than the rows moves in the time between its values.
-        measured_s = max(seconds, float(np.median(np.diff(t_s[changes]))))
+        measured_s = max(seconds, period_s(t_s, gap))
         least = min(LEAP_SPEED_M_S * seconds, usual + LEAP_M_S2 * measured_s**2)
         if _leap(steps, steps > 0.0, least) is not None:
             yield (
