@@ -192,6 +192,14 @@ SOUND = {
     "stairs": (STAIRS * (T_S < 2.7) + NOISE_N[0], None, OPEN_AGAIN_M),
     "a sensor that says 0 without a load": (np.where(RELEASED_N < 0.3, 0.0, RELEASED_N), None, OPEN_AGAIN_M),
     "a gap as it was commanded, in steps": (LEFT, RIGHT, STAIRS_M),
+    "a coarse gap before a rigid object": (
+        np.where(T_S < 2.7, np.clip(T_S - 1.0, 0.0, 0.02) * 300.0, 0.0) + NOISE_N[0], None,
+        np.round(np.interp(T_S, [0.0, 1.0, 2.7, 3.0], [0.059, 0.05, 0.05, 0.08]) / 0.00075) * 0.00075,
+    ),
+    "a release within two samples": (
+        spoilt(270, [1.5]), None, np.where(T_S < 2.68, OPEN_AGAIN_M, OPEN_AGAIN_M[np.arange(300) - 4])
+    ),
+    "noise of one step": (np.round(2.0 * (RELEASED_N + 20.0 * NOISE_N[1])) / 2.0, None, OPEN_AGAIN_M),
     "fast fingers": (
         RELEASED_N, None,
         np.interp(T_S, [0.0, 0.3, 0.34, 1.0, 2.68, 2.7, 3.0], [0.08, 0.08, 0.072, 0.05, 0.05, 0.054, 0.08]),

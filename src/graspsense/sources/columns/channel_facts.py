@@ -91,6 +91,12 @@ def usual_range(values: Numbers) -> tuple[float, float]:
     return float(low), float(high)
 
 
+def period_s(t_s: Numbers, signal: Numbers) -> float:
+    """Return the usual time (s) between two new values of a signal, infinite if it has none."""
+    new = np.diff(t_s[np.flatnonzero(np.diff(signal))])
+    return float(np.median(new)) if len(new) else np.inf
+
+
 def _age_s(values: Numbers, t_s: Numbers, end_s: float | None) -> float:
     rows = values.reshape(len(values), -1)
     changed = (rows[1:] != rows[:-1]).any(axis=1)

@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from graspsense.sources.columns.channel_facts import usual_range
+from graspsense.sources.columns.channel_facts import period_s, usual_range
 from graspsense.sources.formats.table import Numbers
 
 LEAST_S: Final = 0.015
@@ -60,10 +60,9 @@ def _slows_after_force(t_s: Numbers, gap: Numbers, force: Numbers) -> float | No
         return None
     begun_s = float(t_s[free[-1] + 1])
     new = np.concatenate(([True], np.diff(gap) != 0.0))  # the rows can be more than the values of the gap
-    changes = np.flatnonzero(np.diff(force)) + 1
     times, values = t_s[new] - begun_s, gap[new]
     approach = (times > -APPROACH_S[0]) & (times < -APPROACH_S[1])
-    if approach.sum() < FEWEST or np.median(np.diff(t_s[changes])) > LONGEST_STEP_S:
+    if approach.sum() < FEWEST or period_s(t_s, force) > LONGEST_STEP_S:
         return None
     course = np.polyfit(times[approach], values[approach], 1)
     late = values - np.polyval(course, times)

@@ -20,7 +20,7 @@ from graspsense.core.control.contact import CONTACT_FORCE_N
 from graspsense.core.values.fingers import FingerForce
 from graspsense.recording.labelled_recording import LabelledRecording
 from graspsense.recording.replayable import Recording
-from graspsense.sources.columns.channel_facts import resolution, usual_range
+from graspsense.sources.columns.channel_facts import period_s, resolution, usual_range
 from graspsense.sources.formats.table import Numbers
 
 FEWEST: Final = 20
@@ -140,17 +140,14 @@ def signal_notices(recording: Recording) -> Iterator[str]:
     """
     t, gap, left, right = columns = recording.columns("t_s", "gap_m", "force_left_n", "force_right_n")
     columns[~np.isfinite(columns)] = np.nan
-    measured = [np.isfinite(signal) for signal in (gap, left, right)]
-    known = np.logical_and.reduce([finite for finite in measured if finite.any()] or measured)
-    pads = force_of_pads(left, right)
-    forces = [
+    measured = [signal for signal in (gap, left, right) if np.isfinite(signal).any()]
+    known = np.isfinite([t, *measured]).all(axis=0)
+    pads = [
         _Force(what, t[known], gap[known], force[known], recording.units)
-        for what, force in pads.items()
-        if np.isfinite(force).any()
+        for what, force in force_of_pads(left, right).items()
     ]
-    silent = [what for what, force in pads.items() if len(t) > 1 and not np.isfinite(force).any()]
-    told = [f"{what} has no number: was the sensor connected?" for what in silent]
-    told += [text for force in forces for text in _of_sensor(force)]
+    forces = [pad for pad in pads if np.isfinite(pad.n).all()]
+    told = [text for pad in pads for text in _of_sensor(pad)]
     if int(known.sum()) < FEWEST or not forces:
         yield from told
         return
@@ -208,13 +205,14 @@ def _runs(values: Numbers) -> list[tuple[int, int]]:
 
 def _of_sensor(force: _Force) -> Iterator[str]:
     """Yield that a force was not measured, or not all the time."""
-    if len(force) > 2 and not np.ptp(force.n):
-        yield f"{force.what} does not change during the recording: is it another column, or did its sensor stop?"
+    if len(force) > 1 and np.isnan(force.n).all():
+        yield f"{force.what} has no number: was the sensor connected?"
+    elif len(force) > 2 and not np.ptp(force.n):
+        yield f"{force.what} does not change: is it another column, did its sensor stop, or was nothing touched?"
     elif len(force) >= FEWEST and (held := _held(force.n)) is not None:
         begin, end = held
-        repeats = "its last value to the end"
-        if end < len(force):
-            repeats = f"one value from {force.t[begin]:.4g} to {force.when(end - 1)}"
+        stays = f"one value from {force.t[begin]:.4g} to {force.when(end - 1)}"
+        repeats = stays if end < len(force) else "its last value to the end"
         yield (
             f"{force.what} repeats {repeats}, although it varied before: did its sensor stop, or is it "
             "at the end of its range?"
@@ -225,10 +223,9 @@ def _of_sensor(force: _Force) -> Iterator[str]:
 
 def _filled(signal: _Force) -> Iterator[str]:
     """Yield that a signal with noise is a straight line while it changes, as between samples that were missing."""
-    bends = _bends(signal.n)
     if not signal.noise > NOISE * FINE * (resolution(signal.n) or np.inf):
         return
-    for begin, end in pairwise([0, *(bends + 1).tolist(), len(signal) - 1]):
+    for begin, end in pairwise([0, *(_bends(signal.n) + 1).tolist(), len(signal) - 1]):
         if end - begin >= LINE and abs(signal.n[end] - signal.n[begin]) > PART * signal.span:
             yield (
                 f"{signal.what} is a straight line from {signal.t[begin]:.4g} to {signal.when(end)}, although it has "
@@ -284,15 +281,15 @@ def _numb(pad: _Force, other: _Force) -> Iterator[str]:
     loaded = other_n > other.low + LOADED * span
     begin, noise = int(loaded.argmax()), noise / math.sqrt(width)
     free = other_n[:begin] < other.low + PART * span + noise
-    if not free.any() or width > np.count_nonzero(loaded):
+    # Without an object, the mean of noise has a small part of its range.
+    if not free.any() or width > np.count_nonzero(loaded) or np.ptp(other_n) < LOADED * span:
         return
     zero = float(np.median(felt_n[:begin][free]))
     away = np.abs(felt_n - zero)
     loaded &= pad.gap <= pad.gap[begin]
-    numb, felt = loaded & (away < max(noise, SLIGHT * span)), np.flatnonzero(away > FREE * span)
+    numb, felt = loaded & (away < max(noise, SLIGHT * span)), away > FREE * span
     if np.count_nonzero(numb) < max(FEWEST, PART * np.count_nonzero(loaded)):
-        numb[: felt[0] + 1 if len(felt) else None] = False
-        numb[felt[-1] if len(felt) else 0 :] = False
+        numb &= np.logical_or.accumulate(felt) & np.logical_or.accumulate(felt[::-1])[::-1]
     if np.count_nonzero(numb) > GLITCH_SAMPLES:
         from_k, until_k = np.flatnonzero(numb)[[0, -1]].tolist()
         yield (
@@ -365,8 +362,8 @@ def _falls_at_once(force: _Force) -> Iterator[str]:
     k = _leap(-steps, closed[1:], max(FREE * force.span, force.noise))
     if k is None or steps.max() > LOADED * -steps[k - 1]:
         return
-    opened = np.flatnonzero(~closed[k:])[:1] + k
-    if float(np.ptp(course[k : opened[0] if len(opened) else None])) > FREE * force.span:
+    fallen = course[k:][np.logical_and.accumulate(closed[k:])]
+    if (fallen - np.minimum.accumulate(fallen)).max(initial=0.0) > FREE * force.span:
         yield (
             f"the force falls by {force.amount(course[k - 1] - course[k])} at once at {force.when(k)}, and then grows "
             "again in the closed fingers: did the object break or slip, or was the zero of the sensor set under a load?"
@@ -382,8 +379,7 @@ def _rough(force: _Force) -> Iterator[str]:
     steps = np.diff(np.unique(force.n))
     counts = steps / steps.min()
     if varies > SLIGHT:
-        share = f"{100 * varies:.0f} %"
-        yield f"{force.what} varies by {share} of its range around its course, and so does each feature of it"
+        yield f"{force.what} varies by {100 * varies:.0f} % of its range around its course, and so do its features"
     elif steps.min() > PART * force.span and np.allclose(counts, np.round(counts)):
         yield (
             f"{force.what} has steps of {100 * steps.min() / force.span:.0f} % of its range: each value is up to half "
@@ -400,6 +396,8 @@ def _glitches(force: _Force) -> Iterator[str]:
     if len(sampled) < FEWEST:
         return
     step_s, span = float(np.median(np.diff(t))), float(np.ptp(sampled))
+    # A single value of noise bends the force by twice as much as it is away.
+    noise = max(LEAP * np.median(np.abs(np.diff(sampled, 2))), BEND / 2.0 * (resolution(sampled) or 0.0))
     left = np.zeros(len(sampled), dtype=np.bool_)
     # Under a load, nothing exceeds all other forces several times and then comes back, however rarely it is measured.
     for samples, longest_s, free_share, loaded_share in (
@@ -409,13 +407,14 @@ def _glitches(force: _Force) -> Iterator[str]:
         course = median_course(sampled, min(samples, int(longest_s / step_s)))
         apart, free = np.abs(sampled - course), course < course.min() + PART * np.ptp(course)
         loaded_share *= np.ptp(course) if loaded_share == FAR else 1.0
-        left |= (apart > np.where(free, free_share, loaded_share)) & (apart > NOISE * np.median(apart))
+        left |= apart > np.where(free, free_share, loaded_share).clip(max(NOISE * np.median(apart), noise))
     count, k = int(left.sum()), int(np.argmax(left))
     if 0 < count <= MOST_GLITCHES * len(sampled):
         others = f", and {count - 1} more" if count > 1 else ""
         yield (
             f"{force.what} leaves its course for a moment ({force.amount(sampled[k], '.4g')} at {t[k]:.4g} s{others}): "
-            "if that is a glitch, take it out, since it can pass for a contact or a rest"
+            "if it is no impact, no break and no current of a drive that starts, take it out, since a glitch can pass "
+            "for a contact or a rest"
         )
 
 
@@ -474,7 +473,7 @@ def _bump(force: _Force) -> Iterator[str]:
         yield (
             f"a force comes at {force.when(begin)} and is gone at {force.when(end)}, the fingers close by "
             f"{closes * 1e3:.3g} mm more, and it comes back at {force.when(again)}: the contact is the first of these. "
-            "If the fingers touched something on their way, cut that out; or the object broke"
+            "If it is something on their way, or the current with which a drive starts, cut it out; or the object broke"
         )
     elif not glitch and gap[begin] - gap[pressed] > LOADED * np.ptp(gap):
         yield (
@@ -497,21 +496,24 @@ def _late(force: _Force, *, doubtful: bool) -> Iterator[str]:
         return
     begin, pressed, span = int(free[free < loaded[0]].max(initial=0)), int(loaded[0]), float(np.ptp(gap))
     end = int(free[free > pressed].min(initial=len(t)))
-    narrowest, noise = float(gap[begin:end].min()), NOISE * float(np.median(np.abs(np.diff(force.gap, 2))))
+    narrowest, step = float(gap[begin:end].min()), resolution(force.gap) or 0.0
+    bends = np.abs(np.diff(force.gap, 2))
+    # The steps of a coarse gap that moves are no noise.
+    noise = NOISE * float(np.median(bends * (bends > BEND * step)))
     travel = float(gap[begin]) - narrowest
-    still = max(SLIGHT * travel, noise, LEAP * (resolution(force.gap) or 0.0))
+    still = max(SLIGHT * travel, noise, LEAP * step)
     rests = gap <= narrowest + (still if travel > still else noise)
     came = int(rests[:end].argmax())
-    least_s = max(
-        LATE_S, *(2.0 * period_s(t, values) for values in (t, force.gap, force.n) if np.ptp(values))
-    )
+    least_s = max(LATE_S, *(2.5 * period_s(t, values) for values in (t, force.gap, force.n)))
     stays = np.flatnonzero((gap[came:end] > gap[begin] + SLIGHT * span) & (n[came:end] > LOADED * force.span))
     if travel > still:
         explained = n[: came + 1].max() + (CREEP + 2.0 * still / travel) * force.span
-        later, begins_s = np.flatnonzero(rests[came:end] & (n[came:end] > explained)), 0.0
+        later, begins_s = t[came:end][rests[came:end] & (n[came:end] > explained)], 0.0
     else:
-        later = np.flatnonzero(n[came:pressed] < SLIGHT * force.span)
-        begins_s = LOADED * float(t[pressed] - t[begin])
+        later = t[came:pressed][n[came:pressed] < SLIGHT * force.span]
+        # They can still close by a step of the gap.
+        begins_s = LOADED * float(t[pressed] - t[begin]) + period_s(t[:came], gap[:came])
+    lasts_s = float(later[-1] - later[0]) if len(later) else 0.0
     opens = end - 1 + int((gap[end - 1 :] > narrowest + 0.5 * SLIGHT * span).argmax())
     late_s = float(t[opens] - t[end - 1])
     around_s = t[begin] + late_s * np.arange(-1, 2)
@@ -528,31 +530,23 @@ def _late(force: _Force, *, doubtful: bool) -> Iterator[str]:
             f"the fingers go on as fast after the force begins (at {force.when(begin)}), and open {late_s:.2g} s "
             "after it is gone: does the gap come late?"
         )
-    elif (
-        not doubtful and came and len(later) and t[came + later[-1]] - t[came + later[0]] > least_s + begins_s
-    ):
+    elif not doubtful and came and lasts_s > least_s + begins_s:
         grown = 100.0 * float(n[begin:end].max() - n[came]) / force.span
         yield (
             f"{force.what} grows by {grown:.0f} % of its range after {force.when(came)}, while the fingers rest: does "
-            "it come late, was it smoothed, is it the current of a drive with friction, or is something hard in a soft "
-            "layer? If it is late, a contact is too"
+            "it come late, was it smoothed, does the drive press on (a servo, or the current of one with friction), or "
+            "is something hard in a soft layer, or left of what broke? If it is late, a contact is too"
         )
-
-
-def period_s(t_s: Numbers, signal: Numbers) -> float:
-    """Return the usual time (s) between two new values of a signal, infinite if it has none."""
-    new = np.diff(t_s[np.flatnonzero(np.diff(signal))])
-    return float(np.median(new)) if len(new) else np.inf
 
 
 def _gap_leaps(t_s: Numbers, gap: Numbers) -> Iterator[str]:
     """Yield that a gap (m) leaps faster (s) than fingers move, or has new values so rarely that it changes by much."""
-    steps, changes = np.abs(np.diff(gap)), np.flatnonzero(np.diff(gap))
-    if len(changes) >= FEWEST:
+    steps = np.abs(np.diff(gap))
+    if np.count_nonzero(steps) >= FEWEST:
         k, usual = int(steps.argmax()), float(np.sort(steps)[-3])
         seconds = max(float(np.diff(t_s)[k]), float(np.median(np.diff(t_s))))
         # A gap that is measured more rarely than the rows moves in the time between its values.
-        measured_s = max(seconds, float(np.median(np.diff(t_s[changes]))))
+        measured_s = max(seconds, period_s(t_s, gap))
         least = min(LEAP_SPEED_M_S * seconds, usual + LEAP_M_S2 * measured_s**2)
         if _leap(steps, steps > 0.0, least) is not None:
             yield (

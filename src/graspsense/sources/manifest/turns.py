@@ -15,8 +15,8 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from graspsense.sources.columns.channel_facts import resolution, usual_range
-from graspsense.sources.columns.recording_notices import PART, period_s
+from graspsense.sources.columns.channel_facts import period_s, resolution, usual_range
+from graspsense.sources.columns.recording_notices import PART
 from graspsense.sources.formats.table import Numbers
 from graspsense.sources.manifest.steps import NOISE
 
