@@ -22,8 +22,7 @@ class OwnLoopConfig:
         unit="N",
         above=0.0,
         plausible=(0.1, 200.0),
-        meaning="For a gripper that closes by itself: force with which the fingers approach; at least what moves them. "
-        "The probing force, if that is less.",
+        meaning="For a gripper that closes by itself: force that moves the fingers to the contact, at most that asked.",
     )
     force_step_n: float = setting(
         default=5.0,
