@@ -58,7 +58,7 @@ def test_nothing_there_is_an_outcome_with_reasons_and_exit_code_0():
     assert done.returncode == 0
     assert done.json["outcome"] == "nothing there"
     assert done.json["features"]["p_first"] is None
-    assert "no pad felt" in done.json["reasons"]["p_first"]
+    assert "no finger felt" in done.json["reasons"]["p_first"]
 
 
 @every_case(

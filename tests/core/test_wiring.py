@@ -114,7 +114,7 @@ RAPID = "features lab/rapid needs the channel 'force_left' in N at 100 Hz or mor
 )
 def test_one_misfit_is_told_with_what_to_choose(misfit, gripper, controller, features, says, choices):
     head, told, grippers, others = misfit(gripper, controller, features).splitlines()
-    assert head == "two components do not fit together:"
+    assert head == "the components do not fit together:"
     assert says in told
     assert f"lab/{controller} and" in grippers
     assert grippers.endswith("none is installed")

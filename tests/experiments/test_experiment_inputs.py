@@ -492,6 +492,17 @@ def test_a_sweep_that_changed_no_result_is_told(tmp_path, sweep, alike):
     assert ("changes nothing" in answer(summary)) is bool(alike)
 
 
+def test_parts_that_have_a_case_in_common_do_not_say_that_nothing_has_an_effect(tmp_path):
+    table(tmp_path / "t.csv", 1, 1.0)
+    experiment(tmp_path, "t.csv")
+    for name in "ab":
+        (tmp_path / f"{name}.toml").write_text((tmp_path / "e.toml").read_text())
+    (tmp_path / "both.toml").write_text('title = "x"\nparts = ["a.toml", "b.toml"]\n')
+    planned = read_experiment(str(tmp_path / "both.toml"))
+    run_experiment(planned, Results(tmp_path / "out"), Serial)
+    assert summarise(planned, Results(tmp_path / "out")).alike == []
+
+
 VARIANT = '[[variants]]\nname = "{}"\n[variants.controller]\nclosing_speed_m_s = {}\n'
 
 

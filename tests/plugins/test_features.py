@@ -72,11 +72,11 @@ TOUCHED = [(0.06, 9.0, 9.0)]
     ("rows", "missing", "why"),
     [
         ([], set(NAMES), "empty"),
-        ([(0.06, 0.0, 0.0)] * 50, set(NAMES), "no pad felt"),
+        ([(0.06, 0.0, 0.0)] * 50, set(NAMES), "no finger felt"),
         ([(0.06, 9.0, 0.0)] * 50, set(NAMES), "left pad"),
         ([(0.06, 0.0, 9.0)] * 50, set(NAMES), "right pad"),
         ([(0.06, 9.0, 0.0)] * 25 + [(0.06, 0.0, 9.0)] * 25, set(NAMES), "same time"),
-        ([(0.06, math.nan, math.nan)] * 50, set(NAMES), "no pad felt"),
+        ([(0.06, math.nan, math.nan)] * 50, set(NAMES), "no finger felt"),
         # A contact without rest, way, gap or force.
         (RISES, set(NAMES) - {"p_first"}, "not at rest"),
         ([(0.03, 9.0, 9.0)] * 100, {"dp_dt", "df_dt"}, "delta_t is zero"),

@@ -37,7 +37,7 @@ def test_only_an_emulated_gripper_can_be_given_an_object():
     assert any(kind.default for kind in emulated.objects())
     assert not real.objects()
     with pytest.raises(ConfigError, match="'blok'"):
-        emulated.with_object("blok").open(0)
+        emulated.with_object("blok")
     with pytest.raises(ConfigError, match="object 'can:full_open'"):
         real.with_object("can:full_open")
 

@@ -186,7 +186,7 @@ def test_the_driver_reads_images_in_a_thread_with_their_age_and_each_board_has_i
 
 def test_of_two_boards_that_are_not_both_there_none_is_kept(ports):
     [where], _ = ports(1)
-    with pytest.raises(OSError, match="nowhere"):
+    with pytest.raises(OSError, match="fingertips at /dev/nowhere"):
         opened_boards([where, "/dev/nowhere"])
     # The port is exclusive.
     [board] = opened_boards([where])

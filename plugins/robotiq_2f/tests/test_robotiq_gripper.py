@@ -305,7 +305,9 @@ def test_no_gripper_is_said_with_what_to_look_at(port):
         create("sensor-backend", "robotiq", port=port).open(0)
 
 
-@every_case("setting", ["controller.approach_force_n=5", "run.first_effort_n=12"])
+@every_case(
+    "setting", ["controller.approach_force_n=5", "controller.probing_force_n=10", "run.first_effort_n=12"]
+)
 def test_less_than_the_least_force_is_refused_before_anything_moves(setting):
     with pytest.raises(WiringError, match="20 N"):
         load_pipeline("robotiq", options=["gripper.port=/dev/nowhere", setting])

@@ -48,7 +48,7 @@ def test_object_and_state_are_named_at_once_with_the_reason(pipeline, name):
         ("egg", "unlike everything"),
         slow("block", "is unlike everything trained on"),
         slow("toy", "is unlike everything trained on"),
-        slow("none", "no feature is defined: no pad felt 0.625 N while the fingers closed"),
+        slow("none", "no feature is defined: no finger felt 0.625 N while the fingers closed"),
     ],
 )
 def test_what_it_never_saw_is_unknown(pipeline, name, why):

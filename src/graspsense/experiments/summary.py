@@ -183,8 +183,8 @@ class Summary:
     def alike(self) -> list[list[str]]:
         """The names of cases that have the same trials and the same answers to the last digit, for each such group.
 
-        What differs between them has no effect. Cases with a source of their own to test on are left out, as their
-        results do not hold those trials.
+        What differs between them has no effect. Of different parts, they may not differ at all. Cases with a source
+        of their own to test on are left out, as their results do not hold those trials.
         """
         cases: dict[Any, list[str]] = {}
         for case in self.planned.cases:
@@ -198,7 +198,7 @@ class Summary:
                 if result is not None and result.trials is not None
             )
             if case.test is None and len(content) == len(results):
-                cases.setdefault(content, []).append(case.name)
+                cases.setdefault((case.part, content), []).append(case.name)
         return [names for names in cases.values() if len(names) > 1]
 
     @property

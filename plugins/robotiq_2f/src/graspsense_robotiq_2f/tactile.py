@@ -8,7 +8,7 @@ from contextlib import ExitStack, closing, suppress
 from math import inf, nan
 from typing import Any, Final, NamedTuple, Protocol, final
 
-from graspsense.gripper_api import DeviceClock, ReadingThread, clock_report
+from graspsense.gripper_api import DeviceClock, ReadingThread, clock_report, why_not_opened
 from graspsense.plugin_api import FastChannel, Samples
 from graspsense_robotiq_2f.tactile_protocol import (
     ACCELERATION,
@@ -243,7 +243,10 @@ class TactileBoard:
         import serial
 
         self.stream = TactileStream(fingers)
-        self._port: Any = serial.Serial(port, BAUD, timeout=READ_S, write_timeout=READ_S, exclusive=True)
+        try:
+            self._port: Any = serial.Serial(port, BAUD, timeout=READ_S, write_timeout=READ_S, exclusive=True)
+        except (OSError, ValueError) as error:
+            raise OSError(f"the fingertips at {port}: {why_not_opened(port)}") from error
         self._port.write(START_SENDING)
         self._thread = ReadingThread(self._read, name="TSF-85", joined=joined)
 

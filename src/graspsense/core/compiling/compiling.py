@@ -110,7 +110,7 @@ def compile_function(
         import numba
     except ImportError as error:
         raise NotCompilable(f'numba is not installed: pip install "{options.install}"') from error
-    if numba.config.DISABLE_JIT:
+    if getattr(numba.config, "DISABLE_JIT", 0):  # numba sets it from the environment
         raise NotCompilable("NUMBA_DISABLE_JIT is set")
     if len(_COMPILED) >= MAX_COMPILED:
         _COMPILED.clear()

@@ -140,9 +140,10 @@ class BackendWithEmulator(SensorBackend[EmulatorSettingsT]):
         return tuple(_unopened(config.body, config.body_config, config.object).objects())
 
     def with_object(self, name: str) -> SensorBackend[EmulatorSettingsT]:
-        """Return the emulated gripper with this object. Raises ConfigError for a real one."""
+        """Return the emulated gripper with this object. Raises ConfigError for a real one and an unknown object."""
         if not self.config.emulated:
             return super().with_object(name)
+        _unopened(self.config.body, self.config.body_config, None).with_object(name)
         return type(self)(evolve(self.config, object=name))
 
     def marked(self, info: DeviceInfo) -> DeviceInfo:

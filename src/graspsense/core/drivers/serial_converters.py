@@ -57,7 +57,7 @@ def why_not_opened(port: str) -> str:
         return "there is no such port"
     if not os.access(port, os.R_OK | os.W_OK):
         return "no permission to open it"
-    return "it cannot be opened, perhaps because another program uses it"
+    return "it cannot be opened: it is no serial port, or another program uses it"
 
 
 def port_failed(backend: str, port: str, error: Exception) -> Finding:

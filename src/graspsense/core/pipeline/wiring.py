@@ -31,11 +31,8 @@ def check(settings: Settings) -> None:
     misfits = [misfit for user in users for misfit in _channel_misfits(settings.gripper, user)]
     misfits += _command_misfits(settings.gripper, settings.controller)
     if misfits:
-        head = (
-            "the components do not fit together" if len(misfits) > 1 else "two components do not fit together"
-        )
         advice = [*_pipelines_of(settings.gripper.component), *_fitting(settings)]
-        raise WiringError("\n  ".join([f"{head}:", *misfits, *advice]))
+        raise WiringError("\n  ".join(["the components do not fit together:", *misfits, *advice]))
     if too_small := [*_too_small(settings)]:
         raise WiringError("\n  ".join(["the gripper cannot do as little as is asked:", *too_small]))
 

@@ -332,7 +332,7 @@ def _component(
         for layer in users:
             for key in layer.values[table]:
                 if key != "type" and (layer.final or layer is setter):
-                    text = f'classifier.type is "{NONE}", so this key has no meaning'
+                    text = f'classifier.type is "{NONE}": choose one that has this key'
                     complaints.append(layer.complain(InvalidValue((table, key), text)))
         return None
     try:

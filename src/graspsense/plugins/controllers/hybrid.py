@@ -178,12 +178,11 @@ class HybridController(Controller[HybridConfig]):
 
     def asked_force_n(self) -> float:
         """Return the probing force (N)."""
-        config = self.config
-        return float(max(config.probing_force_n, config.approach_force_n if self._own_loop else 0.0))
+        return float(self.config.probing_force_n)
 
     def gentlest_force_n(self) -> float:
         """Return the probing force (N), or that of the approach where one is sent."""
-        return float(self.config.approach_force_n if self._own_loop else self.config.probing_force_n)
+        return float(approaching(self.config).force_n if self._own_loop else self.config.probing_force_n)
 
     def asked_interval_s(self) -> float | None:
         """Return the time of a step of the force (s), where it is raised in steps."""

@@ -22,7 +22,7 @@ class OwnLoopConfig:
         unit="N",
         above=0.0,
         plausible=(0.1, 200.0),
-        meaning="For a gripper that closes by itself: force with which the fingers approach; at least what moves them.",
+        meaning="For a gripper that closes by itself: force that moves the fingers to the contact, at most that asked.",
     )
     force_step_n: float = setting(
         default=5.0,
@@ -50,7 +50,7 @@ class Raised(NamedTuple):
 
 def approaching(params: Any) -> Raised:
     """Return what is sent until the contact."""
-    return Raised(params.approach_force_n, 0.0, nan)
+    return Raised(min(params.approach_force_n, params.probing_force_n), 0.0, nan)
 
 
 def rises(now: Raised, most_n: float) -> bool:
@@ -61,5 +61,5 @@ def rises(now: Raised, most_n: float) -> bool:
 def raised(params: Any, now: Raised, t_s: float, most_n: float) -> Raised:
     """Return what is sent in this tick of the squeeze: the same, or one step more, up to `most_n`."""
     if t_s - now.since_t_s >= params.step_time_s and rises(now, most_n):
-        return Raised(max(now.force_n, min(now.force_n + params.force_step_n, most_n)), t_s, nan)
+        return Raised(min(now.force_n + params.force_step_n, most_n), t_s, nan)
     return now

@@ -178,11 +178,11 @@ class SendAndWatchController(Controller[SendAndWatchConfig]):
 
     def asked_force_n(self) -> float:
         """Return the probing force (N)."""
-        return float(max(self.config.probing_force_n, self.config.approach_force_n))
+        return float(self.config.probing_force_n)
 
     def gentlest_force_n(self) -> float:
         """Return the force of the approach (N)."""
-        return float(self.config.approach_force_n)
+        return float(approaching(self.config).force_n)
 
     def asked_speed_m_s(self) -> float:
         """Return the closing speed (m/s)."""

@@ -79,7 +79,7 @@ REST: Final = 7.0
 """How far a grasp came (`Measured.reached`); up to BOTH_TOO_LATE without a contact of both pads."""
 _WHY_NO_CONTACT: Final = {
     NO_TICKS: "the trace is empty",
-    NO_PAD: "no pad felt {} while the fingers closed",
+    NO_PAD: "no finger felt {} while the fingers closed",
     LEFT_ONLY: "only the left pad felt {} while the fingers closed",
     RIGHT_ONLY: "only the right pad felt {} while the fingers closed",
     NEVER_BOTH: "the pads never felt {} at the same time while the fingers closed",
