@@ -1,8 +1,12 @@
-"""What holds for all tests here: none judges how fast this machine is, byte code stays, algebra has one thread."""
+"""What holds for all tests here: none judges how fast this machine is, byte code stays, algebra has one thread.
+
+Nor does any see the calibrations and the settings of the user who runs them.
+"""
 
 import gc
 import os
 import sys
+from tempfile import TemporaryDirectory
 
 from hypothesis import HealthCheck, settings
 
@@ -27,6 +31,10 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 # Before numpy is imported: the arrays of tests are small, and idle threads of the algebra spin on cores of others.
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(name, "1")
+
+_FOLDER = TemporaryDirectory(prefix="graspsense-tests-")
+for name in ("XDG_DATA_HOME", "XDG_CONFIG_HOME"):
+    os.environ[name] = _FOLDER.name
 
 
 def pytest_collection_finish() -> None:
