@@ -10,7 +10,7 @@ from cases import every_case
 from repository import ROOT
 from test_report import Reader, evaluated
 
-from graspsense import Features, Prediction, load_pipeline
+from graspsense import Features, Prediction, load_pipeline, load_trials
 from graspsense.core.components.moved_names import SPECIAL
 from graspsense.core.values.errors import PluginUnavailable
 from graspsense.evaluation.intervals import RecognitionRate
@@ -94,6 +94,11 @@ def test_features_show_units_for_people_and_reasons():
     assert repr(features) == "<Features: p_first 57.8 mm, ratio 0.5, hysteresis missing>"
     assert "no <release>" in shown(features)
     assert "is missing" in shown(features)
+
+
+def test_trials_are_counted_in_a_line():
+    trials = load_trials(str(ROOT / "samples" / "features.csv"), label="object")
+    assert repr(trials).startswith("<Labelled: 40 trials of 4 labels with 6 features, from ")
 
 
 def test_an_evaluation_shows_its_rate_warnings_and_controls():

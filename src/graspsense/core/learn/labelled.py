@@ -15,6 +15,7 @@ from graspsense.core.values.errors import ConfigError, DataDamaged, counted, sug
 from graspsense.core.values.features import LARGEST_VALUE, FeatureTable
 from graspsense.core.values.label_text import label_text
 from graspsense.core.values.limits import CLASSES, FEATURES
+from graspsense.core.values.printable import in_one_line
 
 if TYPE_CHECKING:
     import numpy as np
@@ -134,6 +135,11 @@ class Labelled:
     def __len__(self) -> int:
         """Return the number of trials."""
         return len(self.labels)
+
+    def __repr__(self) -> str:
+        labels, features = counted(len(self.classes), "label"), counted(len(self.table.names), "feature")
+        words = f"{counted(len(self), 'trial')} of {labels} with {features}, from {self.source}"
+        return in_one_line(f"<Labelled: {words}>")
 
     @property
     def classes(self) -> tuple[str, ...]:
