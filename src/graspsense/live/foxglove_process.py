@@ -69,6 +69,7 @@ class FoxgloveViewer:
         self._grasp, self._transport, self._context = grasp, transport, foxglove.Context()
         self._channels: list[foxglove.Channel] = []
         self._subscribed: set[int] = set()
+        self._stopping = Lock()
         self.logged = self.sent = 0
         """Bytes that the SDK was given, and that were passed on."""
         # A page that guesses would have to find one of 2^24 addresses beside the port.
@@ -86,6 +87,11 @@ class FoxgloveViewer:
             for topic in grasp.topics:
                 self.announce(*topic)
             grasp.viewers.add(self)
+
+    def stop(self) -> None:
+        """Stop its server, once its viewer has answered. The end of the grasp and of the connection both do so."""
+        with self._stopping:  # which the SDK refuses to do in two threads at once
+            self.server.stop()
 
     @property
     def has_all(self) -> bool:
@@ -208,7 +214,7 @@ class Gate(ViewerServer[bytearray]):
             with self.grasp.lock:
                 self.grasp.viewers.discard(viewer)
             # It waits until its connection has ended, which this loop has to see.
-            await asyncio.to_thread(viewer.server.stop)
+            await asyncio.to_thread(viewer.stop)
 
     def pass_on(self, part: bytearray) -> None:
         """Pass on the complete messages of a buffer."""
@@ -222,7 +228,7 @@ class Gate(ViewerServer[bytearray]):
                     await asyncio.sleep(0.01)
         viewers = list(self.grasp.viewers)
         # Each waits until its viewer has answered the end.
-        stops = [asyncio.to_thread(viewer.server.stop) for viewer in viewers]
+        stops = [asyncio.to_thread(viewer.stop) for viewer in viewers]
         with suppress(TimeoutError):
             async with asyncio.timeout(CLOSE_S):
                 await asyncio.gather(*stops)
