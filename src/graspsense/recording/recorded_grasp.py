@@ -40,6 +40,7 @@ from graspsense.recording.layout import (
     EVENT,
     KINDS,
     PADS_TOPIC,
+    START,
     SCALARS_TOPIC,
     SIGNAL_TOPIC,
     Topic,
@@ -266,6 +267,14 @@ class RecordedGrasp:
                 column[k] = column[k]._replace(new=0, values=nothing.values)
         return column
 
+    def _recorded_with(self) -> Mapping[str, Mapping[str, Any]]:
+        """Return the settings of the gripper and the controller that made it; none where that is not known."""
+        try:
+            settings = self.record().settings
+        except DataDamaged:
+            return {}
+        return {table: settings[table] for table in ("gripper", "controller") if table in settings}
+
     def _rate_of_ticks(self) -> float:
         """Return the number of ticks per unit of time, from their times; 1000 where these do not increase."""
         times = self.ticks["t_s"]
@@ -292,6 +301,7 @@ class RecordedGrasp:
             channels=self.channels,
             mounting=self.device.mounting,
             events=self.labelled_events(),
+            recorded_with=self._recorded_with(),
         )
 
 

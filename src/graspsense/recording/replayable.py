@@ -10,7 +10,7 @@ import math
 import struct
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from attrs import field, frozen
@@ -53,6 +53,8 @@ class Recording:
     """Where the frames of tool and fingers were, if this is known."""
     events: Mapping[str, tuple[GraspEvent, ...]] = field(factory=dict)
     """The events that others labelled in it, by their names; one without events was looked for and did not happen."""
+    recorded_with: Mapping[str, Mapping[str, Any]] = field(factory=dict)
+    """The settings that it was recorded with, if they are known."""
 
     @cached_property
     def frames(self) -> NDArray[np.float64]:

@@ -328,7 +328,8 @@ def differences_from(
         yield f"these trials were recorded with {recipes} different settings of gripper, controller or features"
     trained = dict(trained_with.get("settings", {}))
     kind = "simulated grasps" if simulated else "grasps"
-    for table, now, ignored in _compared(settings, provenance):
+    recorded_with = {} if device is None else device.recorded_with
+    for table, now, ignored in _compared(settings, recorded_with, provenance):
         then = trained.get(table)
         if then is None:
             continue
@@ -380,15 +381,23 @@ def _kind(values: Any) -> str:
 
 
 def _compared(
-    settings: Settings | None, provenance: Mapping[str, Any] | None
+    settings: Settings | None,
+    recorded_with: Mapping[str, Mapping[str, Any]],
+    provenance: Mapping[str, Any] | None,
 ) -> Iterator[tuple[str, Mapping[str, Any], frozenset[str]]]:
-    """Yield the tables of settings of a trial, with the keys that may differ between training and use."""
-    stated = (provenance or {}).get("settings") or {}
+    """Yield the tables of settings of a trial, with the keys that may differ between training and use.
+
+    Of a recording, those of the gripper that made it count. So do those of the controller then, besides those of the
+    controller that follows it now.
+    """
+    stated = (provenance or {}).get("settings") or {} if settings is None else settings.values
     for table in COMPARED_TABLES:
-        if settings is not None and settings.values.get(table) is not None:
-            yield table, settings.values[table], _not_compared(type(getattr(settings, table).config))
-        elif settings is None and stated.get(table) is not None:
-            yield table, stated[table], _not_compared(_config_class(table, stated[table].get("type")))
+        of_table = [stated.get(table), recorded_with.get(table)]
+        if table == "gripper" and of_table[1] is not None:
+            del of_table[0]
+        for k, keys in enumerate(of_table):
+            if keys is not None and keys not in of_table[:k]:
+                yield table, keys, _not_compared(_config_class(table, keys.get("type")))
 
 
 def _config_class(table: str, name: Any) -> type:

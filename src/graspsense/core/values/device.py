@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import nan
-from typing import Literal
+from typing import Any, Literal
 
 from attrs import field, frozen
 
@@ -33,7 +33,8 @@ class DeviceInfo:
     declared: the guard adds it to the force that the controller asks for. `open_gap_m` is the gap of open fingers where
     `opening` is no position (m, NaN: not known): another one is told. `status_bits` says what the bits of
     `Frame.status` mean. `harmless` is True where the fingers can hurt nothing, as in a pure model: the guard then only
-    keeps commands within the limits of the device.
+    keeps commands within the limits of the device. `recorded_with` has the settings of the gripper and the controller
+    that made a recording, as far as they are known.
     """
 
     name: str
@@ -58,3 +59,4 @@ class DeviceInfo:
     open_gap_m: float = field(default=nan, converter=float)
     status_bits: tuple[StatusBit, ...] = ()
     harmless: bool = False
+    recorded_with: Mapping[str, Mapping[str, Any]] = field(factory=dict)

@@ -148,6 +148,7 @@ class ReplayBackend(SensorBackend[ReplayConfig]):
             units=recording.units,
             mounting=recording.mounting,
             notes=tuple(dict.fromkeys((*recording.notes, *recording.notices, *signal_notices(recording)))),
+            recorded_with=recording.recorded_with,
         )
 
     def read(self, timeout_s: float) -> Reading:
