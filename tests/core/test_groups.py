@@ -158,8 +158,9 @@ def test_named_instances_and_trials_sorted_by_a_feature_have_no_blocks():
     numbers, values = by_object(np.random.default_rng(1))
     named = table_of(numbers, values, instances=tuple(f"trial {k}" for k in range(len(numbers))))
     assert grouped(named, NO_COPIES) is named
-    by_force = np.lexsort((values[:, 0], numbers))
-    table = table_of(numbers[by_force], values[by_force])
+    single = things(numbers, np.random.default_rng(1))
+    by_force = np.lexsort((single[:, 0], numbers))
+    table = table_of(numbers[by_force], single[by_force])
     assert grouped(table, NO_COPIES) is table
 
 

@@ -1,17 +1,18 @@
-"""Trials of a label in clumps, as windows of one recording and grasps of one object are, whatever their order.
+"""Trials of a label in clumps, as windows of one recording, grasps of one object and noisy copies are, in any order.
 
-Two signs together tell: the nearest trials have the same label far more often than others close by, and trials are
-closer to each other than to trials drawn from the spread around them. Each label is then held out in parts of trials
-close to each other, as in block cross-validation (D. R. Roberts et al., Ecography 40 (2017) 913).
+What tells them is distance. Of trials drawn independently, the gaps between the logarithms of the distances of
+successive neighbours, m of them times m, are alike at every m, whatever the density (E. Levina and P. J. Bickel, NIPS 17
+(2005) 777). Behind the last trial of a clump the gap is larger, and so is the distance at which Ward's method merges a
+clump with others. Both are compared with those of trials that have the same values of each feature, and the same
+correlations of their ranks, but are drawn independently (a normal copula; R. B. Nelsen, An Introduction to Copulas,
+2006).
 
-Noisy copies of each trial, and as many grasps of each object, are told by a gap: of trials drawn independently, the
-logarithm of the distances of the neighbours m + 1 and m has the mean 1 / (m dimension) at every m (E. Levina and P. J.
-Bickel, NIPS 17 (2005) 777). Behind the m others that are of the same one, it is larger than at other m.
+Each label is then held out in parts of trials close to each other, as in block cross-validation (D. R. Roberts et al.,
+Ecography 40 (2017) 913).
 """
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -26,24 +27,17 @@ if TYPE_CHECKING:
 
 NEAREST: Final = 1e-7
 """Distances, in standard deviations, below which the difference of two squares is not known."""
-_FEWEST_CLUMPED: Final = 12
+_FEWEST: Final = 6
 """Trials of a label from which on it can be told whether they are in clumps."""
-_LARGEST_CLUMP: Final = 25
-"""Trials of a clump up to which it may be a recording or an object; larger ones are kinds of their label."""
-_CLUMPED: Final = (3.0, 2.0)
-"""Standard deviations by which near trials have the label more often, and are closer, than others, if in clumps."""
-_SECOND: Final = 1
-"""Place of the nearest distance by which clumps are told, so that pairs, as copies with noise, are none."""
-_LESS_FAR: Final = 0.8
-"""Share of the agreement of the labels, beyond chance, that is lost outside a clump."""
-PARTS: Final = 10
-"""Parts of each label that are held out, if its trials are in clumps: ten folds."""
-_MOST_REPEATED: Final = 9
-"""Largest number of others that are of the same one as a trial: ten grasps of an object are usual."""
-_FEWEST_REPEATED: Final = 6
-"""Trials for each of these others from which on they can be told; each label has half as many groups of them."""
-_GAP: Final = 3.0
-"""Standard deviations by which the gap behind these is wider than gaps between other neighbours."""
+_SHARE: Final = 3
+"""A clump has at most one of so many parts of the trials of its label: larger ones are kinds of the label."""
+_MOST_OTHERS: Final = 10
+"""Largest number of other trials in a clump behind which a gap is looked for: ten grasps of an object are usual."""
+_LARGEST: Final = 25
+"""Trials of a clump up to which it may be a recording; larger ones are kinds of their label."""
+_DRAWS: Final = 24
+_CLUMPED: Final = 6.5
+"""Standard deviations by which gaps and merges, together, are larger than those of independent trials, if in clumps."""
 
 
 def distances_between(values: Values, others: Values) -> Values:
@@ -53,98 +47,75 @@ def distances_between(values: Values, others: Values) -> Values:
     return distances
 
 
-def parts_of_clumps(values: Values, labels: Sequence[str], copies: Numbers) -> Numbers | None:
+def parts_of_clumps(values: Values, labels: Sequence[str], first_of: Numbers) -> Numbers | None:
     """Return the part of its label that each trial is in, shape (n,); None if trials are not in clumps.
 
-    `values` are the scaled features, shape (n, features). The pairs of trials `copies`, shape (2, pairs), do not count.
+    `values` are the scaled features, shape (n, features). `first_of` has the trial that each one is a copy of, itself
+    if of none: copies do not count.
     """
     from scipy.cluster.hierarchy import fcluster, ward
 
     codes = np.unique(np.array(labels), return_inverse=True)[1]
-    if values.shape[1] < 2:
+    originals = first_of == np.arange(len(codes))
+    rows_of = [np.flatnonzero(originals & (codes == code)) for code in range(codes.max() + 1)]
+    judged = [rows for rows in rows_of if len(rows) >= _FEWEST]
+    if values.shape[1] < 2 or not judged:
         return None
+    rng = np.random.default_rng(0)
+    signs = np.array([_signs(values[rows]) for rows in judged]).sum(axis=0)
+    by_chance = np.array(
+        [[_signs(_drawn(values[rows], rng)) for rows in judged] for _ in range(_DRAWS)]
+    ).sum(axis=1)
+    spread = np.maximum(by_chance.std(axis=0), NEAREST)
+    if ((signs - by_chance.mean(axis=0)) / spread).sum() <= _CLUMPED:
+        return None
+    part_of = np.arange(len(codes))
+    for rows in judged:
+        # Each trial is a share of its clump, which ends at its largest gap.
+        clumps = (1.0 / (_gaps(values[rows]).argmax(axis=1) + 2.0)).sum()
+        part_of[rows] = rows[0] + len(codes) * fcluster(ward(values[rows]), max(round(clumps), 2), "maxclust")
+    return part_of[first_of]
+
+
+def _signs(values: Values) -> tuple[float, float]:
+    """Return the sums, over the trials of a label, of the largest gap and of the merge of the most separate clump."""
+    return float(_gaps(values).max(axis=1).sum()), _separation(values)
+
+
+def _gaps(values: Values) -> Values:
+    """Return m times the gap behind each neighbour m of each trial, shape (trials, neighbours)."""
     apart = distances_between(values, values)
     np.fill_diagonal(apart, np.inf)
-    apart[copies[0], copies[1]] = apart[copies[1], copies[0]] = np.inf
-    # A coarse feature puts trials on a lattice, and copies lie at equal distances from others: both make gaps.
-    fine = all(2 * len(np.unique(column)) > len(values) for column in values.T)
-    repeated = _repeated(apart, codes) if fine and not copies.size else 0
-    if not repeated and not _in_clumps(values, codes, apart):
-        return None
-    part_of = np.zeros(len(codes), dtype=np.int64)
-    for code, size in enumerate(np.bincount(codes).tolist()):
-        rows = np.flatnonzero(codes == code)
-        parts = max(size // (repeated + 1), 1) if repeated else PARTS
-        part_of[rows] = fcluster(ward(values[rows]), parts, "maxclust") if size > parts else np.arange(size)
-    return codes * len(codes) + part_of
+    others = max(min(len(values) // _SHARE, _MOST_OTHERS), 2)
+    near = np.sort(np.partition(apart, others, axis=1)[:, : others + 1], axis=1)
+    gaps: Values = np.arange(1, others + 1) * np.diff(np.log(np.maximum(near, NEAREST)), axis=1)
+    return gaps
 
 
-def _repeated(apart: Values, codes: Numbers) -> int:
-    """Return how many others are of the same one as each trial, by the gap behind them; 0 if there is none.
+def _separation(values: Values) -> float:
+    """Return the sum over the trials of the logarithm by which the most separate clump with it is farther than wide."""
+    from scipy.cluster.hierarchy import ward
 
-    Only trials of the same label are compared, and those of labels whose trials may be of several: others of another
-    label that lie between hide the gap, and labels that are far from each other have one too.
-    """
-    of_label = np.bincount(codes)[codes]
-    near = np.sort(np.where(codes[:, np.newaxis] == codes, apart, np.inf), axis=1)[:, : _MOST_REPEATED + 2]
-    near = np.where(np.isinf(near), np.nan, np.clip(near, NEAREST, 1.0 / NEAREST))
-    gaps = np.arange(1, near.shape[1]) * np.diff(np.log(near), axis=1)
-    # Two trials that are next to each other have about the same distances, so that they count as one.
-    wider = [0.0]
-    for others in range(1, min(_MOST_REPEATED, len(apart) // _FEWEST_REPEATED) + 1):
-        judged = gaps[of_label >= _FEWEST_REPEATED * (others + 1) // 2]
-        wide = len(judged) >= _FEWEST_REPEATED * others
-        beyond = judged[:, others - 1] - np.nanmean(np.delete(judged, others - 1, axis=1), axis=1)
-        wider.append(
-            math.sqrt(len(judged) / 2.0) * beyond.mean() / max(beyond.std(), NEAREST) if wide else 0.0
-        )
-    return int(np.argmax(wider)) if max(wider) > _GAP else 0
+    merges, n = ward(values), len(values)
+    parent = np.zeros(2 * n - 1, dtype=np.int64)
+    parent[merges[:, :2].astype(np.int64)] = np.arange(n, 2 * n - 1)[:, np.newaxis]
+    height = np.log(np.maximum(merges[:, 2], NEAREST))
+    small = np.flatnonzero(merges[:-1, 3] <= max(min(n // _SHARE, _LARGEST), 3))
+    most = np.zeros(2 * n - 1)
+    most[n + small] = height[parent[n + small] - n] - height[small]
+    for cluster in range(2 * n - 3, -1, -1):
+        most[cluster] = max(most[cluster], most[parent[cluster]])
+    return float(most[:n].sum())
 
 
-def _in_clumps(values: Values, codes: Numbers, apart: Values) -> bool:
-    """Return whether near trials have the same label, and are close, more than smooth distributions make them.
+def _drawn(values: Values, rng: np.random.Generator) -> Values:
+    """Return independent trials with the same values of each feature and about the same correlations of their ranks."""
+    from scipy.special import ndtri
+    from scipy.stats import rankdata
 
-    The first is M. F. Schilling's count of neighbours (J. Am. Stat. Assoc. 81 (1986) 799), of the two nearest and of
-    others; the second compares distances as B. Hopkins and J. G. Skellam do (Ann. Bot. 18 (1954) 213), with points
-    drawn from the normal distribution of the third of a label that is around a trial.
-    """
-    sizes = np.bincount(codes)
-    many = sizes >= _FEWEST_CLUMPED
-    if many.sum() < 2:
-        return False
-    fewest, judged = int(sizes[many].min()), many[codes]
-    begin = min(fewest // 4, _LARGEST_CLUMP)
-    same = codes[np.argsort(apart, axis=1, kind="stable")] == codes[:, np.newaxis]
-    near, far = same[:, :2].mean(axis=1), same[:, begin : begin + max(fewest // 12, 1)].mean(axis=1)
-    by_chance = (sizes[codes] - 1.0) / (len(codes) - 1.0)
-    # Each label weighs as much as any other.
-    weights = judged / sizes[codes] / many.sum()
-    near_beyond, far_beyond = (float(weights @ (share - by_chance)) for share in (near, far))
-    spread = math.sqrt(float(weights**2 @ (near - far - near_beyond + far_beyond) ** 2))
-    if far_beyond > _LESS_FAR * near_beyond or near_beyond - far_beyond <= _CLUMPED[0] * spread:
-        return False
-    rng = np.random.default_rng(0)
-    closer = np.concatenate(
-        [
-            _closer(values[codes == code], apart[np.ix_(codes == code, codes == code)], rng)
-            for code in np.flatnonzero(many)
-        ]
-    )
-    return bool(closer.mean() * math.sqrt(len(closer)) > _CLUMPED[1] * closer.std())
-
-
-def _closer(values: Values, apart: Values, rng: np.random.Generator) -> Values:
-    """Return the logarithm of how many times closer the second other trial is to each one than to a point around it."""
-    n = len(values)
-    around = np.argsort(apart, axis=1, kind="stable")[:, : n // 3 - 1]
-    around = np.column_stack([np.arange(n), around])
-    drawn = rng.normal(size=around.shape)
-    shares = (drawn - drawn.mean(axis=1, keepdims=True)) / math.sqrt(around.shape[1] - 1.0)
-    weights = np.zeros((n, n))
-    np.put_along_axis(weights, around, shares + 1.0 / around.shape[1], axis=1)
-    to_a_trial, to_a_point = (
-        np.clip(np.partition(distances, _SECOND, axis=1)[:, _SECOND], NEAREST, 1.0 / NEAREST)
-        for distances in (apart, distances_between(weights @ values, values))
-    )
-    closer: Values = np.log(to_a_point / to_a_trial)
-    return closer
+    scores = ndtri((rankdata(values, axis=0) - 0.5) / len(values))
+    _, sizes, axes = np.linalg.svd(scores, full_matrices=False)
+    normal = rng.normal(size=(len(values), len(sizes))) * sizes @ axes
+    places = np.argsort(np.argsort(normal, axis=0), axis=0)
+    drawn: Values = np.take_along_axis(np.sort(values, axis=0), places, axis=0)
+    return drawn

@@ -105,7 +105,8 @@ def _together(labelled: Labelled, copies: Numbers) -> tuple[Numbers, str]:
         length, group_of = _blocks(labelled)
         alike = "trials of a label that follow each other are more alike than others"
         why = f"{alike}. Blocks of {length}" if length > 1 else ""
-    part_of = None if why or len(labelled) > _MOST_TRIALS else parts_of_clumps(values, labels, copies)
+    first_of = np.array(joined(copies, len(labelled)))
+    part_of = None if why or len(labelled) > _MOST_TRIALS else parts_of_clumps(values, labels, first_of)
     if part_of is None:
         return group_of, why
     return part_of, f"trials are in clumps that are alike. {len(np.unique(part_of))} parts of them"
