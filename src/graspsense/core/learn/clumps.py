@@ -36,7 +36,7 @@ _MOST_OTHERS: Final = 10
 _LARGEST: Final = 25
 """Trials of a clump up to which it may be a recording; larger ones are kinds of their label."""
 _DRAWS: Final = 24
-_CLUMPED: Final = 6.5
+_CLUMPED: Final = 7.0
 """Standard deviations by which gaps and merges, together, are larger than those of independent trials, if in clumps."""
 
 
@@ -63,9 +63,9 @@ def parts_of_clumps(values: Values, labels: Sequence[str], first_of: Numbers) ->
         return None
     rng = np.random.default_rng(0)
     signs = np.array([_signs(values[rows]) for rows in judged]).sum(axis=0)
-    by_chance = np.array(
-        [[_signs(_drawn(values[rows], rng)) for rows in judged] for _ in range(_DRAWS)]
-    ).sum(axis=1)
+    by_chance = np.array([[_signs(_drawn(values[rows], rng)) for rows in judged] for _ in range(_DRAWS)]).sum(
+        axis=1
+    )
     spread = np.maximum(by_chance.std(axis=0), NEAREST)
     if ((signs - by_chance.mean(axis=0)) / spread).sum() <= _CLUMPED:
         return None

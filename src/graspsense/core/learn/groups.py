@@ -102,9 +102,9 @@ def _together(labelled: Labelled, copies: Numbers) -> tuple[Numbers, str]:
         number = _scaled(np.array(labelled.value.values)[:, np.newaxis])
         values, labels = np.column_stack([values, math.sqrt(values.shape[1]) * number]), ("",) * len(labels)
     else:
-        length, group_of = _blocks(labelled)
+        blocks, group_of = _blocks(labelled)
         alike = "trials of a label that follow each other are more alike than others"
-        why = f"{alike}. Blocks of {length}" if length > 1 else ""
+        why = f"{alike}. {blocks}" if blocks else ""
     first_of = np.array(joined(copies, len(labelled)))
     part_of = None if why or len(labelled) > _MOST_TRIALS else parts_of_clumps(values, labels, first_of)
     if part_of is None:
@@ -246,25 +246,42 @@ def tail(successes: int, n: int, share: float) -> float:
     return float(bdtrc(successes - 1, n, share))
 
 
-def _blocks(labelled: Labelled) -> tuple[int, Numbers]:
-    """Return the length of the blocks in which trials of a label are alike, and the block of each trial.
+def _blocks(labelled: Labelled) -> tuple[str, Numbers]:
+    """Return in words the blocks in which trials of a label are alike, and the block of each trial.
 
-    The length is 1 if they are not, and if the trials are sorted by a feature. Each label has two blocks at least.
+    Where trials of a stretch, between which no other label was recorded, are more alike than others of their label, as
+    after a new mounting, blocks are of whole stretches. There are none, and the words are empty, if trials are not
+    alike, or are sorted by a feature. Each label has two blocks at least.
     """
     times = np.arange(len(labelled)) if labelled.order is None else np.array(labelled.order)
     codes = np.unique(np.array(labelled.labels), return_inverse=True)[1]
     in_time = np.lexsort((times, codes))
+    places = np.argsort(np.argsort(times, kind="stable"))[in_time]
     codes, values = codes[in_time], labelled.table.values[in_time]
-    sizes = np.bincount(codes)
-    place = np.arange(len(codes)) - (np.cumsum(sizes) - sizes)[codes]
-    length, block_of = 1, np.arange(len(codes))
+    begins = np.flatnonzero(np.r_[True, (np.diff(places) != 1) | (np.diff(codes) != 0)])
+    trials = np.diff(np.r_[begins, len(codes)])[:, np.newaxis]
+
+    def within_stretches(ranks: Values) -> float:
+        return float((np.add.reduceat(ranks, begins, axis=0) ** 2 / trials).sum())
+
     limit = np.inf if _is_sorted(values, codes) else _ALIKE
-    while _likeness(means_of(values, block_of), codes[np.unique(block_of, return_index=True)[1]]) > limit:
+    stretches = beyond_chance(values, codes, within_stretches) > limit
+    unit_of = np.repeat(np.arange(len(begins)), trials.ravel()) if stretches else np.arange(len(codes))
+    of_unit = codes[np.unique(unit_of, return_index=True)[1]]
+    sizes = np.bincount(of_unit)
+    place = np.arange(len(of_unit)) - (np.cumsum(sizes) - sizes)[of_unit]
+    length, block_of, limit = 1, np.arange(len(of_unit)), _STILL_ALIKE if stretches else limit
+    while (
+        _likeness(means_of(values, block_of[unit_of]), of_unit[np.unique(block_of, return_index=True)[1]])
+        > limit
+    ):
         length, limit = 2 * length, _STILL_ALIKE
-        block_of = codes * len(codes) + place // np.minimum(length, (sizes + 1) // 2)[codes]
-    result = np.empty_like(block_of)
-    result[in_time] = block_of
-    return length, result
+        block_of = of_unit * len(of_unit) + place // np.minimum(length, (sizes + 1) // 2)[of_unit]
+    result = np.empty_like(unit_of)
+    result[in_time] = block_of[unit_of]
+    if stretches:
+        return "Stretches" if length == 1 else f"Blocks of {length} stretches", result
+    return f"Blocks of {length}" if length > 1 else "", result
 
 
 def _is_sorted(values: Values, codes: Numbers) -> bool:
