@@ -40,7 +40,6 @@ from graspsense.recording.layout import (
     EVENT,
     KINDS,
     PADS_TOPIC,
-    START,
     SCALARS_TOPIC,
     SIGNAL_TOPIC,
     Topic,
@@ -114,6 +113,12 @@ class RecordedGrasp:
         """Return everything that is stored of the trial besides its ticks. Raises DataDamaged."""
         return TrialRecord.from_sections(self.metadata, str(self.path))
 
+    def _readable_record(self) -> TrialRecord | None:
+        try:
+            return self.record()
+        except DataDamaged:
+            return None
+
     @property
     def pads(self) -> NDArray[np.void]:
         """The images of the fingertips, one row each: `t_s`, `counter`, and the cells of both."""
@@ -179,11 +184,8 @@ class RecordedGrasp:
 
     def labelled_events(self) -> dict[str, tuple[GraspEvent, ...]]:
         """Return the events that others labelled in an imported recording, by their names; of a damaged one, none."""
-        try:
-            result = self.record().result
-        except DataDamaged:
-            return {}
-        details = {} if result is None else result.details
+        record = self._readable_record()
+        details = {} if record is None or record.result is None else record.result.details
         names = str((details.get("report") or {}).get(LABELLED, ""))
         events = [
             event_from_json(event) for event in details.get("events") or () if event.get("source") == "label"
@@ -267,14 +269,6 @@ class RecordedGrasp:
                 column[k] = column[k]._replace(new=0, values=nothing.values)
         return column
 
-    def _recorded_with(self) -> Mapping[str, Mapping[str, Any]]:
-        """Return the settings of the gripper and the controller that made it; none where that is not known."""
-        try:
-            settings = self.record().settings
-        except DataDamaged:
-            return {}
-        return {table: settings[table] for table in ("gripper", "controller") if table in settings}
-
     def _rate_of_ticks(self) -> float:
         """Return the number of ticks per unit of time, from their times; 1000 where these do not increase."""
         times = self.ticks["t_s"]
@@ -290,6 +284,7 @@ class RecordedGrasp:
         units = {name: unit for name, unit in self.units.items() if SI_UNITS.get(name) != unit}
         # An imported recording has no commands, and ends where the imported file ends.
         known = not np.isnan(self.ticks["command"]).any()
+        record = self._readable_record()
         return Recording(
             name=f"recording {self.path.name} of {self.device.name or 'an unknown gripper'}",
             readings=self.readings(),
@@ -301,7 +296,7 @@ class RecordedGrasp:
             channels=self.channels,
             mounting=self.device.mounting,
             events=self.labelled_events(),
-            recorded_with=self._recorded_with(),
+            recorded_with={} if record is None else record.recorded_with,
         )
 
 

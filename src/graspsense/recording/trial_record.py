@@ -179,6 +179,11 @@ class TrialRecord:
         return self.device is not None and self.device.simulated
 
     @property
+    def recorded_with(self) -> dict[str, Mapping[str, Any]]:
+        """The settings of the gripper and the controller that made it, as far as they are known."""
+        return {table: self.settings[table] for table in ("gripper", "controller") if table in self.settings}
+
+    @property
     def settings_text(self) -> str:
         """The settings as a pipeline file in TOML."""
         head = f"# Settings of a trial of {self.made_at}, written by graspsense {__version__}."

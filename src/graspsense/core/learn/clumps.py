@@ -1,11 +1,10 @@
 """Trials of a label in clumps, as windows of one recording, grasps of one object and noisy copies are, in any order.
 
-What tells them is distance. Of trials drawn independently, the gaps between the logarithms of the distances of
-successive neighbours, m of them times m, are alike at every m, whatever the density (E. Levina and P. J. Bickel, NIPS 17
-(2005) 777). Behind the last trial of a clump the gap is larger, and so is the distance at which Ward's method merges a
-clump with others. Both are compared with those of trials that have the same values of each feature, and the same
-correlations of their ranks, but are drawn independently (a normal copula; R. B. Nelsen, An Introduction to Copulas,
-2006).
+What tells them is distance. Of trials drawn independently, the gap between the logarithms of the distances of the
+neighbours m + 1 and m has the mean 1 / (m dimension) at every m (E. Levina and P. J. Bickel, NIPS 17 (2005) 777).
+Behind the last trial of a clump the gap is larger, and so is the distance at which Ward's method merges a clump with
+others. Both are compared with those of trials that have the same values of each feature, and the same correlations of
+their ranks, but are drawn independently (a normal copula; R. B. Nelsen, An Introduction to Copulas, 2006).
 
 Each label is then held out in parts of trials close to each other, as in block cross-validation (D. R. Roberts et al.,
 Ecography 40 (2017) 913).

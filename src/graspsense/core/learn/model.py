@@ -123,7 +123,7 @@ class Model:
         the model, or has it in another unit, is unknown, with that as the reason. Raises DataDamaged if the classifier
         gives no probabilities.
         """
-        differences = tuple(self.differences(settings, device, provenance))
+        differences = tuple(differences_from(self.provenance, settings, device, provenance))
         warnings = (*self._kind_warnings(differences), *differences)
         probabilities: Mapping[str, float] = {}
         because: tuple[Reason | str, ...]
@@ -168,7 +168,7 @@ class Model:
         self, table: FeatureTable, provenance: Mapping[str, Any] | None = None
     ) -> list[Prediction]:
         """Return the predictions of many trials in one call, without reasons. Raises what `answers` raises."""
-        differences = tuple(self.differences(provenance=provenance))
+        differences = tuple(differences_from(self.provenance, provenance=provenance))
         warnings = (*self._kind_warnings(differences), *differences)
         made = self._calibrated(table.columns(self.names), self.answers(table), bool(differences))
         return [
@@ -275,18 +275,6 @@ class Model:
                 f"model {self.name!r} cannot be used: {error}. Train it again, with the defaults of {self.component}"
             ) from error
 
-    def differences(
-        self,
-        settings: Settings | None = None,
-        device: DeviceInfo | None = None,
-        provenance: Mapping[str, Any] | None = None,
-    ) -> Iterator[str]:
-        """Yield, in words, how trials differ from those of the training, so that its certainty does not hold for them.
-
-        The arguments are those of `predict`.
-        """
-        return differences_from(self.provenance, settings, device, provenance)
-
     def _kind_warnings(self, differences: Sequence[str]) -> Iterator[str]:
         """Yield what holds for all predictions of this model, unless a difference says more."""
         if self.holds_for and not differences:
@@ -312,7 +300,7 @@ def differences_from(
 ) -> Iterator[str]:
     """Yield, in words, how trials differ from those of the training, whose provenance is `trained_with`.
 
-    The other arguments are those of `Model.predict`.
+    Its certainty does not hold for them. The other arguments are those of `Model.predict`.
     """
     simulated = bool(trained_with.get("simulated", False))
     real = device is not None and device.clock == "device" and not device.simulated
@@ -328,21 +316,24 @@ def differences_from(
         yield f"these trials were recorded with {recipes} different settings of gripper, controller or features"
     trained = dict(trained_with.get("settings", {}))
     kind = "simulated grasps" if simulated else "grasps"
-    recorded_with = {} if device is None else device.recorded_with
-    for table, now, ignored in _compared(settings, recorded_with, provenance):
+    told: dict[str, None] = {}
+    for table, now, ignored in _compared(settings, device, provenance):
         then = trained.get(table)
         if then is None:
             continue
         if then.get("type") != now.get("type"):
-            yield f"trained on {kind} with {table} {then.get('type')}, this one was with {now.get('type')}"
+            told[
+                f"trained on {kind} with {table} {then.get('type')}, this one was with {now.get('type')}"
+            ] = None
             continue
         for key in sorted((then.keys() & now.keys()) - ignored):
             if json_ready(then[key]) != json_ready(now[key]):
                 what, value = worded(key, then[key])
-                yield (
-                    f"trained on {kind} with {what} {value}, this one was with {worded(key, now[key])[1]} "
-                    f"({table}.{key})"
+                other = worded(key, now[key])[1]
+                told[f"trained on {kind} with {what} {value}, this one was with {other} ({table}.{key})"] = (
+                    None
                 )
+    yield from told
 
 
 def checkpoint_model(whole: Model, after_s: float, part: Model) -> Model:
@@ -381,23 +372,22 @@ def _kind(values: Any) -> str:
 
 
 def _compared(
-    settings: Settings | None,
-    recorded_with: Mapping[str, Mapping[str, Any]],
-    provenance: Mapping[str, Any] | None,
+    settings: Settings | None, device: DeviceInfo | None, provenance: Mapping[str, Any] | None
 ) -> Iterator[tuple[str, Mapping[str, Any], frozenset[str]]]:
     """Yield the tables of settings of a trial, with the keys that may differ between training and use.
 
-    Of a recording, those of the gripper that made it count. So do those of the controller then, besides those of the
-    controller that follows it now.
+    Of a recording, the gripper that made it counts, and the controller that did, besides the one that follows it now.
     """
-    stated = (provenance or {}).get("settings") or {} if settings is None else settings.values
+    given = (provenance or {}).get("settings") or {} if settings is None else settings.values
+    recorded_with = {} if device is None else device.recorded_with
     for table in COMPARED_TABLES:
-        of_table = [stated.get(table), recorded_with.get(table)]
-        if table == "gripper" and of_table[1] is not None:
-            del of_table[0]
-        for k, keys in enumerate(of_table):
-            if keys is not None and keys not in of_table[:k]:
-                yield table, keys, _not_compared(_config_class(table, keys.get("type")))
+        followed = {} if table == "gripper" and table in recorded_with else given
+        for keys in (recorded_with.get(table), followed.get(table)):
+            if keys is None:
+                continue
+            config_class = _config_class(table, keys.get("type"))
+            unchanging = settings_marked(config_class, CHANGES_NO_RESULT)
+            yield table, keys, unchanging | settings_marked(config_class, NAMES_INPUT) | {"type"}
 
 
 def _config_class(table: str, name: Any) -> type:
@@ -409,12 +399,6 @@ def _config_class(table: str, name: Any) -> type:
         return installed().find(role, str(name)).config_class()
     except ConfigError:
         return object
-
-
-def _not_compared(config_class: type) -> frozenset[str]:
-    """Return the settings of a component that may differ between training and use without a warning."""
-    unchanging = settings_marked(config_class, CHANGES_NO_RESULT)
-    return unchanging | settings_marked(config_class, NAMES_INPUT) | {"type"}
 
 
 def _bounded(table: FeatureTable) -> FeatureTable:

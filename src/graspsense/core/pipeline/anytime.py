@@ -17,7 +17,7 @@ from typing import Any, Final
 from graspsense.core.components.caller import set_option
 from graspsense.core.components.roles import FeatureSet
 from graspsense.core.grasp.sinks import Tell
-from graspsense.core.learn.model import Model
+from graspsense.core.learn.model import Model, differences_from
 from graspsense.core.settings.resolved import Settings
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import FAILURES, ConfigError, named
@@ -158,7 +158,7 @@ def anytime_of(model: Model | None, feature_set: FeatureSet[Any], settings: Sett
         raise ConfigError(
             f"run.stop_when_sure: model {model.name!r} has no prediction sets at its checkpoints ({reason})"
         )
-    if stops and (differences := [*model.differences(settings)]):
+    if stops and (differences := [*differences_from(model.provenance, settings)]):
         raise ConfigError(
             f"run.stop_when_sure: the sets of model {model.name!r} were not measured under these settings, so nothing "
             f"is sure: {differences[0]}. Train a model with these settings, or let the grasp go on: "
