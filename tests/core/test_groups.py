@@ -44,6 +44,13 @@ def windows(rng, recordings=6, each=10):
     return numbers, values
 
 
+def uneven(rng):
+    """One to nine grasps of each of nine objects of each kind."""
+    numbers, values = by_object(rng, objects=9, each=9)
+    kept = np.arange(len(numbers)) % 9 < np.repeat(rng.integers(1, 10, 27), 9)
+    return table_of(numbers[kept], values[kept])
+
+
 def pasted(rng, kinds=3, each=15):
     """Each grasp twice, the second time with other digits, in any order."""
     numbers = np.repeat(np.arange(kinds), each)
@@ -96,8 +103,28 @@ def test_neighbours_that_are_alike_are_held_out_in_blocks_of_the_order_of_record
     ]
 
 
+@every_case("stretches", [2, 4])
+def test_stretches_of_a_label_that_are_alike_as_after_a_new_mounting_are_held_out_whole(stretches):
+    numbers = np.tile(np.repeat(np.arange(2), 8), stretches)
+    stretch_of = np.arange(len(numbers)) // 8
+    told = {"mounted anew": 0, "as before": 0}
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        values = things(numbers, rng)
+        mounted = values + 1.5 * rng.normal(size=(2 * stretches, 4))[stretch_of]
+        order = tuple(range(len(numbers)))
+        trials = grouped(table_of(numbers, mounted, order=order), NO_COPIES)
+        told["mounted anew"] += trials.grouped and all(
+            len({trials.instances[i] for i in np.flatnonzero(stretch_of == k)}) == 1
+            for k in range(2 * stretches)
+        )
+        told["as before"] += grouped(table_of(numbers, values, order=order), NO_COPIES).grouped
+    assert told["mounted anew"] >= 9
+    assert told["as before"] == 0
+
+
 def test_windows_and_grasps_of_unnamed_objects_in_any_order_are_held_out_together_and_other_trials_are_not():
-    told = {"windows": 0, "objects": 0, "single": 0, "inside and outside": 0}
+    told = {"windows": 0, "objects": 0, "objects with uneven trials": 0, "single": 0, "inside and outside": 0}
     for seed in range(10):
         rng = np.random.default_rng(seed)
         numbers, values = windows(rng, recordings=12, each=20)
@@ -107,6 +134,7 @@ def test_windows_and_grasps_of_unnamed_objects_in_any_order_are_held_out_togethe
         made = {
             "windows": table_of(numbers, values),
             "objects": table_of(*by_object(rng, objects=9, each=9)),
+            "objects with uneven trials": uneven(rng),
             "single": table_of(alone, single),
             "inside and outside": table_of((distance > np.median(distance)).astype(int), single),
         }
@@ -115,6 +143,7 @@ def test_windows_and_grasps_of_unnamed_objects_in_any_order_are_held_out_togethe
             told[name] += grouped(mixed, NO_COPIES) is not mixed
     assert told["windows"] >= 9
     assert told["objects"] >= 4
+    assert told["objects with uneven trials"] >= 8
     assert told["single"] == told["inside and outside"] == 0
 
 

@@ -144,6 +144,29 @@ def test_another_force_speed_or_gripper_is_said(options, gripper, said):
     assert all(options.split("=")[0] in warning for warning in warnings if not gripper)
 
 
+@every_case(
+    ("options", "forgotten", "told"),
+    [
+        ("", "", 0),
+        ("gripper.object=can:empty_open", "", 0),
+        ("gripper.transmission=pr2_paper", "", 1),
+        ("controller.probing_force_n=17", "", 1),
+        ("", "gripper", 1),
+    ],
+)
+def test_of_a_recording_what_made_it_counts_as_far_as_it_is_known(options, forgotten, told):
+    trained = model(simulated=True, settings=DEFAULTS)
+    made = resolve(options=options.split()).values
+    recorded_with = {table: made[table] for table in ("gripper", "controller") if table != forgotten}
+    replayed = evolve(device("virtual"), recorded_with=recorded_with)
+    flags = (Flag("", "gripper.type", "replay"), Flag("", "gripper.recording", "icub:x.txt"))
+
+    assert len(trained.predict(CAN, resolve(flags=flags), replayed).warnings[1:]) == told
+    # What follows a recording is compared as well, and the same difference is told once.
+    follows = resolve(options=("controller.probing_force_n=17",), flags=flags)
+    assert len(trained.predict(CAN, follows, replayed).warnings[1:]) == told + ("controller" not in options)
+
+
 def test_no_figure_is_given_that_was_not_measured_under_the_settings_of_the_grasp():
     bottled, provenance = bottles(20, spread=0.3), {"simulated": True, "settings": DEFAULTS}
     measured = evolve(model_of(bottled, "c45"), provenance=provenance)

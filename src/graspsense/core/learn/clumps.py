@@ -87,7 +87,7 @@ def _gaps(values: Values) -> Values:
     np.fill_diagonal(apart, np.inf)
     others = max(min(len(values) // _SHARE, _MOST_OTHERS), 2)
     near = np.sort(np.partition(apart, others, axis=1)[:, : others + 1], axis=1)
-    gaps: Values = np.arange(1, others + 1) * np.diff(np.log(np.maximum(near, NEAREST)), axis=1)
+    gaps: Values = np.arange(1.0, others + 1.0) * np.diff(np.log(np.maximum(near, NEAREST)), axis=1)
     return gaps
 
 
