@@ -48,7 +48,7 @@ def csv(tmp_path):
         (GOOD.replace("b,", "бутылка,").encode("cp1251"), DataDamaged, "line 3: byte 0xe1 is not UTF-8"),
         (b"what,p\n\x00\x00,1\n", DataDamaged, "zero bytes"),
         (b"PAR1\x15\x04", DataDamaged, "a binary table"),
-        (b"PK\x03\x04\x00\x00what,p", DataDamaged, "is a spreadsheet"),
+        (b"PK\x03\x04\x00\x00what,p", DataDamaged, "cannot be read as a spreadsheet"),
         ("what,p\na,\nb,\n" * 1, DataDamaged, "any value: p"),
         ("what,name\na,x\na,y\nb,z\n", ConfigError, "besides what"),
         ("what,p\n" + "".join(f"{i * 1.1},{i % 2}\n" for i in range(9)), ConfigError, "be the label"),

@@ -46,7 +46,7 @@ def read_text(path: Path, start: str = "") -> list[ColumnTable]:
     One of several tables that cannot be read has its `damage`. Raises ConfigError if the file cannot be read,
     DataDamaged with the line that does not fit.
     """
-    lines, ended = read_lines(path)
+    lines, ended = read_lines(path, start)
     parts = list(_parts(lines, start))
     several = len(parts) > 1
     read = [

@@ -31,6 +31,7 @@ from graspsense.core.values.written_numbers import (
 )
 from graspsense.recording.readable import readable, refuse_devices
 from graspsense.recording.unpacked import Unpacked
+from graspsense.sources.formats.spreadsheet import spreadsheet_text
 
 LONGEST_NAME: Final = 500
 """Limit on the characters of the name of a column."""
@@ -64,8 +65,10 @@ _REMARKS: Final = frozenset({"comment", "comments", "remark", "remarks", "note",
 _KINDS: Final = frozenset(("continuous", "c", "discrete", "d", "string", "s", "time", "t"))
 """What Orange calls the kinds of columns, in a line below their names."""
 _SEPARATOR_LINE: Final = re.compile(r'"?sep=([;,\t|])"?\s*')
-SPREADSHEETS: Final = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0", b"PAR1", b"ARROW1")
-"""The first bytes of a ZIP file, as which spreadsheets are saved, of those of old programs, and of Apache's tables."""
+_SPREADSHEETS: Final = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
+"""The first bytes of a ZIP file, as which spreadsheets are saved, and of those of old programs."""
+_BINARY: Final = (*_SPREADSHEETS, b"PAR1", b"ARROW1")
+"""The same with those of Apache's tables."""
 _CODE_PAGES: Final = (
     "cp1252", "cp1250", "iso8859-1", "iso8859-15", "cp1251", "koi8-r", "cp1253", "cp1254", "cp1255", "cp1256", "cp850",
     "mac-roman", "shift_jis", "gb18030", "big5", "euc-kr",
@@ -106,12 +109,13 @@ class TextTable:
     separator: str = ""
 
 
-def read_lines(path: Path) -> tuple[list[Line], bool]:
+def read_lines(path: Path, start: str = "") -> tuple[list[Line], bool]:
     """Return the lines of a text file with their numbers, and whether the last one ends as the others do.
 
-    Raises ConfigError, TooLarge, DataDamaged.
+    A spreadsheet is a text with tabs; with `start`, as `read_text` has it, it may have several sheets. Raises
+    PluginUnavailable, ConfigError, TooLarge, DataDamaged.
     """
-    text = text_of(path)
+    text = text_of(path, start)
     if too_many := CELLS.exceeded(text.count("\n") + text.count("\r")):
         raise DataDamaged(f"{path}: {too_many}")
     lines = list(enumerate(re.split("\r\n|[\r\n]", text), 1))
@@ -686,22 +690,24 @@ def check_columns(path: Path, names: Sequence[str]) -> None:
             )
 
 
-def text_of(path: Path) -> str:
-    """Return the text of a file, unpacked if it is compressed by gzip.
+def text_of(path: Path, start: str = "") -> str:
+    """Return the text of a file, unpacked if it is compressed by gzip; see `read_lines`.
 
-    Raises ConfigError if it cannot be read, TooLarge, and DataDamaged if it is not text.
+    Raises PluginUnavailable, ConfigError if it cannot be read, TooLarge, and DataDamaged if it is not text.
     """
     refuse_devices(path)
     most = TEXT_BYTES.most
     with readable(path), path.open("rb") as file:
         data = file.read(most + 1)
         size = len(data) if len(data) <= most else max(path.stat().st_size, len(data))
+    if data.startswith(_SPREADSHEETS):
+        return spreadsheet_text(path, start)
     if data.startswith(b"\x1f\x8b"):
         with readable(path, "a file compressed by gzip"):
             data = Unpacked(path).unpack("gzip", data)
             size = max(size, len(data))
-    if data.startswith(SPREADSHEETS):
-        raise DataDamaged(f"{path} is a spreadsheet, an archive or a binary table: save it as CSV in UTF-8")
+    if data.startswith(_BINARY):
+        raise DataDamaged(f"{path} is an archive or a binary table: save it as CSV in UTF-8")
     if too_large := TEXT_BYTES.exceeded(size):
         raise DataDamaged(f"{path}: {too_large}")
     text = _UNSEEN.sub("", _decoded(path, data)).rstrip("\0")

@@ -14,7 +14,8 @@ from graspsense.recording.export_trace import declared_beside
 from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
 from graspsense.recording.readable import each_readable, error_of_all
 from graspsense.sources.columns.recording_notices import with_notices
-from graspsense.sources.formats.text_table import JSON_LINES, text_suffix
+from graspsense.sources.formats.raw_tables import TEXT_SUFFIXES
+from graspsense.sources.formats.text_table import text_suffix
 from graspsense.sources.recordings.dataset_recordings import (
     datasets_with_recordings,
     is_recording_number,
@@ -25,7 +26,6 @@ from graspsense.sources.recordings.grasp_csv import named
 from graspsense.sources.recordings.replay import KINDS, how_to_get, kind_and_name, known_kinds, read_named
 from graspsense.store.labels import labels_of
 
-CSV_SUFFIXES = (".csv", ".tsv", ".txt", *JSON_LINES)
 KIND_OF = {".npz": "npz", ".parquet": "parquet", ".mcap": "mcap", ".bag": "rosbag"}
 """The kind of a file whose name has no kind before it, by its ending."""
 
@@ -40,8 +40,8 @@ class ImportedRecording:
 
 
 def is_csv(source: str) -> bool:
-    """Return whether a source is a CSV file whose columns options name."""
-    return text_suffix(Path(source)) in CSV_SUFFIXES and ":" not in source
+    """Return whether a source is a text file whose columns options name."""
+    return text_suffix(Path(source)) in TEXT_SUFFIXES and ":" not in source
 
 
 def is_plain_file(source: str) -> bool:
