@@ -1,6 +1,6 @@
 """Text files as tables: where the table begins, what separates its columns, how they are called, and its cells.
 
-A table may be preceded by lines about the instrument, by `sep=;`, or by comments (`#`, `%`), and its names may be
+A table may be preceded by lines about the instrument, by `sep=;`, or by comments (`#`, `%`, `//`, `!`), and its names may be
 followed by a line with units. Its names can stand in a comment, as `numpy.savetxt` writes them. A file with one JSON
 object a line is a table too. Whatever is left out is told in a note.
 """
@@ -56,7 +56,7 @@ _UNSEEN: Final = re.compile("[\u200b\u200e\u200f\u202a-\u202e\u2060\u2066-\u2069
 """Marks that nothing shows: the order of bytes, also in the middle of files that were joined, and of writing."""
 _SEPARATORS: Final = (";", "\t", ",", "|", " ", "  ")
 """The last ones stand for any number of spaces, and for two or more, where names have spaces."""
-_COMMENTS: Final = ("#", "%")
+_COMMENTS: Final = ("#", "%", "//", "!")
 _RULE: Final = re.compile(r"(?=.*[-_=]{3})[-_=+|:\s]+")
 """A line of signs below the names, or around a table."""
 _REMARKS: Final = frozenset({"comment", "comments", "remark", "remarks", "note", "notes"})
@@ -271,9 +271,10 @@ class _Layout:
         """Return the same where `data` rows come before the numbers. Raises DataDamaged if none of them has names."""
         if joined := self._joined_names(data, width):
             return joined
+        head = [row for _, row in self.rows[:data]]
+        below = [row for _, row in self.rows[data:] if row not in head]
         texts = [
-            set() if k in numeric else {row[k] for _, row in self.rows[data:] if k < len(row)}
-            for k in range(width)
+            set() if k in numeric else {row[k] for row in below if k < len(row)} for k in range(width)
         ]
         able = [k for k in range(data) if _can_be_names(self.rows[k][1], width, texts)]
         if not able:
@@ -374,7 +375,7 @@ class _Layout:
 
     def _cells(self, comment: str, width: int) -> list[str]:
         """Return the names in a text, which may separate so many words by another sign than the rows do."""
-        text = comment.strip().lstrip("#% ")
+        text = comment.strip().lstrip("#%/! ")
         for separator in _SEPARATORS[:-2]:
             cells = [cell.strip() for cell in text.split(separator)]
             if len(cells) == width and (
@@ -391,7 +392,8 @@ class _Layout:
         self, rows: list[Row], names: Sequence[str], units: Sequence[str] | None
     ) -> list[Row]:
         """Return the rows that are not the header again."""
-        again = {number for number, row in rows if row == [*names]}
+        folded = [name.casefold() for name in names]
+        again = {number for number, row in rows if [cell.casefold() for cell in row] == folded}
         if not again or all(map(is_number, names)):
             return rows
         self._tell(again, "repeated headers")
@@ -701,7 +703,10 @@ def text_of(path: Path) -> str:
             data = Unpacked(path).unpack("gzip", data)
             size = max(size, len(data))
     if data.startswith(SPREADSHEETS):
-        raise DataDamaged(f"{path} is a spreadsheet, an archive or a binary table: save it as CSV in UTF-8")
+        raise DataDamaged(
+            f"{path} is a spreadsheet, an archive or a binary table. Save the sheet with the trials as a file of its "
+            'own: Save As, "CSV UTF-8" in Excel, "Text CSV" in LibreOffice; to_csv in pandas'
+        )
     if too_large := TEXT_BYTES.exceeded(size):
         raise DataDamaged(f"{path}: {too_large}")
     text = _UNSEEN.sub("", _decoded(path, data)).rstrip("\0")

@@ -22,7 +22,6 @@ from graspsense.core.values.errors import counted, listed
 from graspsense.core.values.features import LARGEST_VALUE
 from graspsense.sources.columns.column_guess import words_of
 from graspsense.sources.trial_table.identifiers import (
-    TIMES,
     are_even,
     can_be_days,
     follow_lines,
@@ -31,6 +30,7 @@ from graspsense.sources.trial_table.identifiers import (
     is_count,
     is_time,
     name_objects,
+    names_a_time,
 )
 
 if TYPE_CHECKING:
@@ -39,15 +39,15 @@ if TYPE_CHECKING:
     from graspsense.sources.formats.csv_columns import CsvColumns
     from graspsense.sources.formats.table import Numbers
 
-_TIME_NAMES: Final = frozenset({
-    "t", "time", "elapsed", "clock", "hour", "hours", "minute", "minutes", "timestamp"
-})  # fmt: skip
-_OF_TIMES: Final = TIMES | {
-    "rec", "recorded", "recording", "start", "begin", "end", "at", "of", "day", "since", "total",
-}  # fmt: skip
 _OF_A_SESSION: Final = frozenset({
     "temperature", "temp", "humidity", "battery", "batt", "vbat", "baseline", "zero", "initial", "start", "before"
 })  # fmt: skip
+_RESULTS: Final = frozenset({
+    "svm", "knn", "nn", "mlp", "cnn", "rf", "lda", "classifier", "model", "output", "out", "margin", "loss", "residual",
+    "decision", "result", "outcome", "votes", "pvalue", "pval",
+})  # fmt: skip
+_OF_RESULTS: Final = _RESULTS | {"value", "val", "distance", "dist", "function", "rank"}
+"""What a model or a test says, by the name of a column."""
 _TEMPERATURES: Final = frozenset({"C", "\u00b0C", "degC"})
 """What can be the same, or drift, in a whole session; by the name of a column, or by its unit."""
 _OFTEN: Final = 3
@@ -64,6 +64,10 @@ _ROUNDED: Final = 6
 """Most digits of a number that is taken for a rounded one."""
 _MOSTLY: Final = 0.75
 """Share of the lines of each label from which on a value may be the setting that this label was recorded with."""
+_NEAR: Final = 0.3
+"""Largest distance of a number from the whole one that it is rounded to."""
+_LONG_WORD: Final = 3
+"""Characters from which on a label in a heading is no chance."""
 _ROUNDED_SUM: Final = 0.02
 """Largest error of a sum of probabilities."""
 _ENOUGH_LINES: Final = 30
@@ -109,7 +113,11 @@ _DOUBTS: Final[Mapping[str, tuple[str, str]]] = {
     ),
     "time": (
         "its name is that of a time, or its values can be dates as spreadsheets and MATLAB number them",
-        "If it is the time of recording, it reveals the labels: ",
+        "If it is the time of recording, it reveals the labels: name it as the order, or ",
+    ),
+    "result": (
+        "its name is that of the result of a model or a test, or has a label in it",
+        "If it is one, it reveals the labels: ",
     ),
     "session": (
         "it is from before the contact, or can drift in a session, by its name or unit",
@@ -186,7 +194,9 @@ def not_held_out(columns: CsvColumns, names: Sequence[str], instances: Sequence[
 def _of_recording(columns: CsvColumns, name: str, labels: Sequence[str]) -> Iterator[str]:
     """Yield why the texts of a column may tell of labels, devices or objects."""
     cells, is_number = columns.cells[name], is_count(columns.units[name])
-    if says_the_label(cells, labels):
+    if says_the_label(cells, labels) or (
+        is_number and not columns.is_nominal(name) and is_code(columns.numbers(name), labels)
+    ):
         yield "same"
         return
     if mostly_says_the_label(cells, labels):
@@ -204,9 +214,10 @@ def _of_numbers(name: str, unit: str, values: Numbers, labels: Sequence[str]) ->
     if (differs or are_in_blocks(labels)) and follow_lines(values, labels):
         yield "order"
     words = set(words_of(name))
-    named_as_time = _TIME_NAMES & words and words <= _TIME_NAMES | _OF_TIMES
-    if of_time and (named_as_time or can_be_days(values)):
+    if of_time and (names_a_time(name) or can_be_days(values)):
         yield "time"
+    if is_result(name, labels if differs else ()):
+        yield "result"
     if differs and (_OF_A_SESSION & words or unit in _TEMPERATURES):
         yield "session"
     if of_time and passes_without_a_gap(values, labels):
@@ -244,15 +255,29 @@ def keeps_rising(values: Sequence[float] | Numbers) -> bool:
 def mostly_says_the_label(values: Sequence[Hashable], labels: Sequence[str]) -> bool:
     """Return whether each label, of lines that are not few, has one of few values in most of its lines.
 
-    There are no more values than labels, as where each was recorded by another operator or at another level of force.
+    Few lines have another value, as where each label was recorded by its operator or at its level of force.
     """
     counts = Counter(labels)
-    usual: dict[str, Hashable] = {}
-    for (value, label), lines in Counter(zip(values, labels, strict=True)).items():
-        if lines >= _MOSTLY * counts[label]:
-            usual[label] = value
-    few = len(set(values)) <= len(counts) and min(counts.values()) >= LEAST_LINES
-    return few and len(usual) == len(counts) and len(set(usual.values())) == len(set(values)) > 1
+    pairs = Counter(zip(values, labels, strict=True))
+    usual = {label: value for (value, label), n in pairs.items() if n >= _MOSTLY * counts[label]}
+    others = sum(n for (value, _), n in pairs.items() if value not in usual.values())
+    few = others <= _FEW * len(labels) and min(counts.values()) >= LEAST_LINES
+    return few and len(usual) == len(counts) and len(set(usual.values())) > 1
+
+
+def is_code(values: Sequence[float], labels: Sequence[str]) -> bool:
+    """Return whether the values of each label are near to a whole number of its own, and these follow each other."""
+    codes = np.round(values)
+    near = bool((np.abs(codes - values) <= _NEAR).all())
+    return near and np.ptp(codes) == len(set(labels)) - 1 and says_the_label(codes.tolist(), labels)
+
+
+def is_result(name: str, labels: Sequence[str]) -> bool:
+    """Return whether a heading is that of the result of a model or a test, or has a label in it, as `score_can`."""
+    words = words_of(name)
+    parts = [words_of(label) for label in set(labels)]
+    of_label = any(len("".join(part)) >= _LONG_WORD and {*part} <= {*words} for part in parts)
+    return of_label or "".join(words) in _RESULTS or bool(_RESULTS & {*words} and {*words} <= _OF_RESULTS)
 
 
 def are_in_blocks(labels: Sequence[str]) -> bool:

@@ -33,9 +33,11 @@ from graspsense.sources.trial_table.doubtful_columns import doubts, not_held_out
 from graspsense.sources.trial_table.exported_table import ExportedTable, exported
 from graspsense.sources.trial_table.identifiers import (
     OF_OBJECTS,
+    OF_ORDER,
     groups_trials,
     identifies,
     names_a_recording,
+    names_a_time,
     text_identifies,
 )
 from graspsense.sources.trial_table.summary_lines import without_summaries
@@ -87,7 +89,7 @@ def read_labelled(
         notes += columns.without_label(label or "")
     target = None if value is None else _target(columns, value, export, notes)
     labels = _labels(columns, label, notes, required=target is None)
-    ranks, no_order = export.order() if export and order is None else (_ranks(columns, order, notes), "")
+    ranks, no_order = export.order() if export and order is None else (_ranks(columns, order), "")
     # No feature of an exported store identifies trials: a feature set made it.
     lines = _lines_once(columns, {order, columns.index}, labels)
     identified = (lambda _: "") if export is not None else _identifying(columns, labels, ranks, lines)
@@ -95,6 +97,8 @@ def read_labelled(
         instance = _object_column(columns, {label, order, columns.index, *features}, identified, notes)
     instances = None if instance is None else tuple(columns.complete_column(instance, "the instance"))
     reserved = {name for name in (label, instance, order, value) if name}
+    if export is None and order is None:
+        notes.append(_no_order(columns, reserved, identified))
     table = _feature_table(columns, features, reserved, identified, notes)
     others = [name for name in columns.names if name not in {*reserved, *table.names}]
     if export is None:
@@ -285,10 +289,24 @@ def _labels(columns: CsvColumns, label: str | None, notes: list[str], *, require
     return labels
 
 
-def _ranks(columns: CsvColumns, order: str | None, notes: list[str]) -> tuple[int, ...]:
+def _no_order(columns: CsvColumns, reserved: set[str], identified: Callable[[str], str]) -> str:
+    """Return a note that no column was named for the order, with those that have another one than the lines."""
+    able = [
+        name
+        for name in columns.names
+        if name not in reserved
+        and (times := columns.times_or_none(name)) is not None
+        and len(set(times[np.isfinite(times)].tolist())) == len(times)
+        and (np.diff(times) < 0.0).any()
+        and (names_a_time(name) or identified(name) in OF_ORDER)
+    ]
+    named = f". If it is that of {listed(able)}, name it ({option('order', 'COLUMN')})" if able else ""
+    return f"no column names the order of recording: the order of the lines is used{named}"
+
+
+def _ranks(columns: CsvColumns, order: str | None) -> tuple[int, ...]:
     """Return the position of each trial in the order of recording. Raises DataDamaged."""
     if order is None:
-        notes.append("no column names the order of recording: the order of the lines is used")
         return tuple(range(len(columns)))
     values = columns.numbers(order)
     if any(math.isnan(value) for value in values):

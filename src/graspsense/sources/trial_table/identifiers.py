@@ -34,6 +34,12 @@ TIMES: Final = frozenset({
     "s", "sec", "secs", "second", "seconds", "ms", "msec", "us", "µs", "ns", "min", "mins", "minute", "minutes",
     "h", "hr", "hrs", "hour", "hours", "d", "day", "days",
 })  # fmt: skip
+_TIME_NAMES: Final = frozenset({
+    "t", "time", "elapsed", "clock", "hour", "hours", "minute", "minutes", "timestamp"
+})  # fmt: skip
+_OF_TIMES: Final = TIMES | {
+    "rec", "recorded", "recording", "start", "begin", "end", "at", "of", "day", "since", "total",
+}  # fmt: skip
 _NAMES: Final = frozenset({
     "id", "uid", "uuid", "index", "idx", "number", "num", "no", "nr", "trial", "run", "row", "line", "record",
     "seq", "sequence", "serial", "counter", "file", "filename", "session", "date", "timestamp", "time",
@@ -44,7 +50,7 @@ _DIVISIONS: Final = frozenset({
     "seed", "trial", "fold", "kfold", "split", "is", "train", "training", "test", "testing", "validation",
     "holdout", "subset", "partition", "rep", "repeat", "repetition", "replicate", "attempt", "try", "take", "iteration",
     "random", "uid", "uuid", "crc", "checksum", "chk", "hash", "sha", "pred", "prediction", "predicted", "proba",
-    "probability", "confidence", "certainty", "score", "logit", "likelihood",
+    "probability", "confidence", "certainty", "score", "logit", "likelihood", "yhat", "hat", "cluster", "correct",
 })  # fmt: skip
 """What trials are told apart and divided by, and what a model said of them."""
 _OF_RECORDINGS: Final = _DIVISIONS | {
@@ -86,9 +92,17 @@ _EPOCH_S: Final = (6.3e8, 4.2e9)
 """The years 1990 to 2100 in seconds since 1970."""
 _PER_SECOND: Final = (1.0, 1e3, 1e6, 1e9)
 """The units of such times."""
+_LONGEST_S: Final = 3.2e8
+"""Ten years, in which the trials of a table were recorded."""
 NAME_OBJECTS: Final = "name the objects (say so by --instance)"
 NUMBER_OBJECTS: Final = "number the objects (name them by --instance)"
 NAME_THINGS: Final = "name the objects, which have several labels (say so by --instance)"
+DATES: Final = "are dates or times"
+FOLLOW: Final = "follow the order of the lines as a counter or a time does"
+NUMBER_TRIALS: Final = "number the trials"
+EQUAL_STEPS: Final = "have equal steps, as those of a clock or a counter"
+OF_ORDER: Final = (DATES, FOLLOW, NUMBER_TRIALS, EQUAL_STEPS)
+"""How the values of a column can tell the order of recording."""
 OF_OBJECTS: Final = (NAME_OBJECTS, NUMBER_OBJECTS)
 """How the values of a column identify trials that are of the same object."""
 _MOST_VALUES: Final = 1.0 / 3.0
@@ -126,6 +140,12 @@ def names_a_recording(name: str) -> bool:
     return bool(words & _OF_RECORDINGS) and words <= _OF_RECORDINGS | _NUMBERED
 
 
+def names_a_time(name: str) -> bool:
+    """Return whether a heading says that a time is in the column, and of nothing but the recording."""
+    words = set(words_of(name))
+    return bool(_TIME_NAMES & words) and words <= _TIME_NAMES | _OF_TIMES
+
+
 def groups_trials(name: str, values: Sequence[str], instances: Sequence[str] | None = None) -> bool:
     """Return whether a column names sessions, operators or devices that whole instances do not hold out.
 
@@ -153,7 +173,7 @@ def identifies(
     if len(column) < LEAST_LINES or column.min() == column.max() or np.abs(column).max() > LARGEST_VALUE:
         return ""
     if _is_calendar(column):
-        return "are dates or times"
+        return DATES
     whole = bool((column == np.floor(column)).all())
     values_of = np.unique(column)
     cells = cells_in_range(values_of) + 1.0
@@ -165,20 +185,20 @@ def identifies(
     named = bool(_NAMES & set(words_of(name)))
     orders = (given, None if order is None else np.array(order)[given])
     if (whole or named) and any(lines is not None and _begins_anew(column, lines) for lines in orders):
-        return "follow the order of the lines as a counter or a time does"
+        return FOLLOW
     if len(set(zip(column.tolist(), known, strict=True))) >= (1.0 - _TIES) * len(column):
         for lines in orders:
             if lines is not None and (
                 (_follows(column, lines, known) and (whole or named or _is_regular(values_of)))
                 or (is_time(unit) and _follows_in_labels(column, lines, known))
             ):
-                return "follow the order of the lines as a counter or a time does"
+                return FOLLOW
         if _hardly_repeats(len(column), len(values_of), cells) or (
             named and whole and len(values_of) == len(column)
         ):
-            return "number the trials"
+            return NUMBER_TRIALS
         if len(values_of) == len(column) >= _SPACED and _is_regular(values_of, _ALIKE):
-            return "have equal steps, as those of a clock or a counter"
+            return EQUAL_STEPS
     return ""
 
 
@@ -196,7 +216,7 @@ def text_identifies(texts: Sequence[str], labels: Sequence[str]) -> str:
     lower = [text.lower() for text in counts]
     of_words = len(counts) > 2 and all(map(_WORDS_OF_DATES.fullmatch, lower))
     if of_words or all(map(_DATE_TEXT.fullmatch, lower)):
-        return "are dates or times"
+        return DATES
     values, own = [text for text, _ in given], [label for _, label in given]
     numbered = all(re.search(r"\d", text) for text in counts)
     hardly = len(counts) > max(2, len(given) * _MOST_VALUES)
@@ -227,7 +247,9 @@ def _is_calendar(column: NDArray[np.float64]) -> bool:
     low, high = _EPOCH_S
     # No two grasps are recorded within a second.
     if distinct > len(column) / 2 and any(
-        low * unit <= least and most <= high * unit and most - least >= (distinct - 1) * unit
+        low * unit <= least
+        and most <= high * unit
+        and (distinct - 1) * unit <= most - least <= _LONGEST_S * unit
         for unit in _PER_SECOND
     ):
         return True
