@@ -9,7 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from graspsense.core.values.errors import ConfigError, DataDamaged
-from graspsense.sources.trial_table.doubtful_columns import keeps_rising
 from graspsense.sources.trial_table.features_csv import read_labelled
 from graspsense.sources.trial_table.identifiers import identifies, text_identifies
 
@@ -139,7 +138,6 @@ def test_a_time_or_a_number_with_any_steps_is_known_in_any_spelling_of_its_unit(
     assert identifies("x", unit, rises, LABELS)
     if unit == "s":
         assert identifies("t", unit, np.random.default_rng(0).exponential(1.0, N).cumsum(), LABELS)
-    assert keeps_rising(rises)
 
 
 @given(seed=st.integers(0, 10_000), scale=st.sampled_from([1e-6, 1e-3, 1.0, 50.0]), digits=st.integers(1, 4))

@@ -152,11 +152,8 @@ class _Reader:
     def _row(self, line: str) -> None:
         tokens = list(self._tokens(line))
         sparse = tokens[:1] == [_OPEN]
-        end = (
-            tokens.index(_CLOSE if sparse else _OPEN)
-            if (_CLOSE if sparse else _OPEN) in tokens
-            else len(tokens)
-        )
+        last = _CLOSE if sparse else _OPEN  # behind which there can be a weight
+        end = tokens.index(last) if last in tokens else len(tokens)
         cells = self._sparse(tokens[1:end]) if sparse else tokens[:end]
         weights = [token for token, _ in tokens[end + 1 :] if token not in "{}"]
         if len(cells) != len(self._attributes):

@@ -57,9 +57,7 @@ _PLAIN_SIGNS: Final = {
     **dict(zip(map(ord, "\uff0b\uff0c\u2248"), "+,~", strict=True)),
 }
 """Signs and spaces of numbers as word processors have them."""
-_ABOUT: Final = re.compile(
-    r"~ ?(?=[-+.\d])|(?<=[\d.]) ?(?:(?:\u00b1|\+/?-) ?[\d.,]+|\([\d.,]+\)(?=$|[eE]))"
-)
+_ABOUT: Final = re.compile(r"~ ?(?=[-+.\d])|(?<=[\d.]) ?(?:(?:\u00b1|\+/?-) ?[\d.,]+|\([\d.,]+\)(?=$|[eE]))")
 """What says that a number is rounded, before it, and how uncertain it is, behind it."""
 _POWER: Final = re.compile(
     r"(?<=[\d.]) ?[x*\u00d7\u00b7\u22c5] ?10(?:(?:\^|\*\*)([-+\u2212]?\d+)|([⁺⁻]?[⁰¹²³⁴-⁹]+))$"
@@ -118,8 +116,7 @@ def is_missing(cell: str) -> bool:
 
 def is_number(cell: str) -> bool:
     """Return whether a text is a number in any notation."""
-    text = plain_text(cell)
-    return any(form.fullmatch(text) for form in _FORMS.values())
+    return _notations(plain_text(cell)) > 0
 
 
 def plain_text(cell: str) -> str:
@@ -246,7 +243,9 @@ def _common(cells: Sequence[str]) -> int | NotNumbers:
     bracketed = [cell.startswith("(") for cell in cells if not is_missing(cell)]
     if bracketed and all(bracketed):
         return NotNumbers(
-            0, cells[0], "and all cells have parentheses or a minus sign behind them: write the minus sign first"
+            0,
+            cells[0],
+            "and all cells have parentheses or a minus sign behind them: write the minus sign first",
         )
     return common or _mixed(cells)
 

@@ -119,11 +119,8 @@ class CsvColumns:
     def numbers(self, name: str) -> list[float]:
         """Return a column as numbers, NaN where missing. Raises DataDamaged with the line that has another text."""
         self.column(name, "a feature")
-        number = self._read_numbers()[name]
+        number = self.numbers_or_times(name)
         if isinstance(number, NotNumbers):
-            times = seconds_since_first(self.cells[name])
-            if times is not None:
-                return [float(value) for value in times]
             raise DataDamaged(f"{self.path}, line {self.lines[number.row]}: {name} is {number.words}")
         infinite = np.flatnonzero(np.isinf(number))
         if len(infinite):
@@ -163,10 +160,11 @@ class CsvColumns:
         numbers = self._read_numbers()[name]
         return None if isinstance(numbers, NotNumbers) else numbers
 
-    def times_or_none(self, name: str) -> Numbers | None:
-        """Return the numbers of a column, or its times in seconds since the first one; None if it has other texts."""
-        numbers = self.numbers_or_none(name)
-        return seconds_since_first(self.cells[name]) if numbers is None else numbers
+    def numbers_or_times(self, name: str) -> Numbers | NotNumbers:
+        """Return the numbers of a column, or its times in seconds since the first one, or why it has neither."""
+        numbers = self._read_numbers()[name]
+        times = seconds_since_first(self.cells[name]) if isinstance(numbers, NotNumbers) else None
+        return numbers if times is None else times
 
     def has_numbers(self, name: str) -> bool:
         """Return whether half of the cells of a column are numbers: a few may be so by chance, as those of hashes."""

@@ -1,8 +1,8 @@
 """Text files as tables: where the table begins, what separates its columns, how they are called, and its cells.
 
-A table may be preceded by lines about the instrument, by `sep=;`, or by comments (`#`, `%`, `//`, `!`), and its names may be
-followed by a line with units. Its names can stand in a comment, as `numpy.savetxt` writes them. A file with one JSON
-object a line is a table too. Whatever is left out is told in a note.
+A table may be preceded by lines about the instrument, by `sep=;`, or by comments (`#`, `%`, `//`, `!`), and its names
+may be followed by a line with units. Its names can stand in a comment, as `numpy.savetxt` writes them. A file with one
+JSON object a line is a table too. Whatever is left out is told in a note.
 """
 
 from __future__ import annotations
@@ -273,9 +273,7 @@ class _Layout:
             return joined
         head = [row for _, row in self.rows[:data]]
         below = [row for _, row in self.rows[data:] if row not in head]
-        texts = [
-            set() if k in numeric else {row[k] for row in below if k < len(row)} for k in range(width)
-        ]
+        texts = [set() if k in numeric else {row[k] for row in below if k < len(row)} for k in range(width)]
         able = [k for k in range(data) if _can_be_names(self.rows[k][1], width, texts)]
         if not able:
             number, row = self.rows[data]

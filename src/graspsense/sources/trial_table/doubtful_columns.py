@@ -12,7 +12,7 @@ from collections.abc import Hashable, Iterator, Mapping, Sequence
 from decimal import Decimal
 from itertools import groupby
 from operator import itemgetter
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from graspsense.core.values.errors import counted, listed
 from graspsense.core.values.features import LARGEST_VALUE
 from graspsense.sources.columns.column_guess import words_of
 from graspsense.sources.trial_table.identifiers import (
+    TIMES,
     are_even,
     can_be_days,
     follow_lines,
@@ -30,7 +31,8 @@ from graspsense.sources.trial_table.identifiers import (
     is_count,
     is_time,
     name_objects,
-    names_a_time,
+    names_only,
+    one_way,
 )
 
 if TYPE_CHECKING:
@@ -39,6 +41,12 @@ if TYPE_CHECKING:
     from graspsense.sources.formats.csv_columns import CsvColumns
     from graspsense.sources.formats.table import Numbers
 
+_TIME_NAMES: Final = frozenset({
+    "t", "time", "elapsed", "clock", "hour", "hours", "minute", "minutes", "timestamp"
+})  # fmt: skip
+_OF_TIMES: Final = TIMES | {
+    "rec", "recorded", "recording", "start", "begin", "end", "at", "of", "day", "since", "total",
+}  # fmt: skip
 _OF_A_SESSION: Final = frozenset({
     "temperature", "temp", "humidity", "battery", "batt", "vbat", "baseline", "zero", "initial", "start", "before"
 })  # fmt: skip
@@ -46,7 +54,7 @@ _RESULTS: Final = frozenset({
     "svm", "knn", "nn", "mlp", "cnn", "rf", "lda", "classifier", "model", "output", "out", "margin", "loss", "residual",
     "decision", "result", "outcome", "votes", "pvalue", "pval",
 })  # fmt: skip
-_OF_RESULTS: Final = _RESULTS | {"value", "val", "distance", "dist", "function", "rank"}
+_OF_RESULTS: Final = frozenset({"value", "val", "distance", "dist", "function", "rank"})
 """What a model or a test says, by the name of a column."""
 _TEMPERATURES: Final = frozenset({"C", "\u00b0C", "degC"})
 """What can be the same, or drift, in a whole session; by the name of a column, or by its unit."""
@@ -81,66 +89,36 @@ _ALIKE: Final = 1.0 / 3.0
 """Ratios of a pad to the other one below which they are far apart, and above which they are alike."""
 _PROPORTIONAL: Final = 1.0 - 1e-6
 """Correlation with the number to predict from which on a column is that number in another unit."""
-_RECORDED: Final = "If it tells when a trial was recorded, it reveals the labels: "
-_DOUBTS: Final[Mapping[str, tuple[str, str]]] = {
-    "same": (
-        "all trials of a label have the same value",
-        "If it is the label in other words, or tells of the recording, ",
-    ),
-    "mostly": (
-        "most trials of each label have the same one of its few values",
-        "If it is a setting of the experiment, or a prediction, it reveals the labels: ",
-    ),
-    "probabilities": (
-        "these are between 0 and 1, their sum is 1, and most trials of each label have the largest one in one of them",
-        "If a model said so, it reveals the labels: ",
-    ),
-    "one label": (
-        "each of its values occurs with one label only, or with labels that no other shares",
-        "If it names sessions, devices or objects, or was measured once for each, it reveals the labels: ",
-    ),
-    "blocks": (
-        "each of its values is that of consecutive lines, as a month, a session or a version is",
-        "If it tells when or how a trial was recorded, it reveals the labels: ",
-    ),
-    "missing": (
-        "some labels have nearly all of its values, and others hardly any",
-        "If the recording is the reason, and not the object, it reveals the labels: ",
-    ),
-    "order": (
-        "its values follow the order of recording within each label, as a drifting zero, a battery or a clock does",
-        _RECORDED,
-    ),
-    "time": (
-        "its name is that of a time, or its values can be dates as spreadsheets and MATLAB number them",
-        "If it is the time of recording, it reveals the labels: name it as the order, or ",
-    ),
-    "result": (
-        "its name is that of the result of a model or a test, or has a label in it",
-        "If it is one, it reveals the labels: ",
-    ),
-    "session": (
-        "it is from before the contact, or can drift in a session, by its name or unit",
-        _RECORDED,
-    ),
-    "without a gap": (
-        "its values pass from label to label without a gap or an overlap, as those of a clock or a counter do",
-        "If it is a time or a counter it reveals the labels: ",
-    ),
-    "digits": (
-        "it is written with fewer digits for some labels than for others",
-        "Digits tell the labels: round all values alike, or ",
-    ),
-    "rising": (
-        "every line has more than the one before, or every line less",
-        "If it is a time or a counter, ",
-    ),
-    "target": (
-        "the number to predict determines it, as in another unit or for a known object",
-        "If it is not measured apart from it, ",
-    ),
+_DOUBTS: Final[Mapping[str, Mapping[str, str]]] = {
+    "If it is the label or a prediction in other words, or a setting of the experiment, it reveals the labels: ": {
+        "same": "all trials of a label have the same value",
+        "mostly": "most trials of each label have the same one of its few values",
+        "probabilities": "these are between 0 and 1, their sum is 1, and most trials of each label have the largest "
+        "one in one of them",
+        "result": "its name is that of the result of a model or a test, or has a label in it",
+    },
+    "If it tells when, how or with which object a trial was recorded, it reveals the labels: ": {
+        "one label": "each of its values occurs with one label only, or with labels that no other shares",
+        "blocks": "each of its values is that of consecutive lines, as a month, a session or a version is",
+        "missing": "some labels have nearly all of its values, and others hardly any",
+        "order": "its values follow the order of recording within each label, as a drifting zero, a battery or a clock "
+        "does",
+        "session": "it is from before the contact, or can drift in a session, by its name or unit",
+        "without a gap": "its values pass from label to label without a gap or an overlap, as those of a clock or a "
+        "counter do",
+    },
+    "If it is the time of recording, it reveals the labels: name it as the order, or ": {
+        "time": "its name is that of a time, or its values can be dates as spreadsheets and MATLAB number them",
+    },
+    "Digits tell the labels: round all values alike, or ": {
+        "digits": "it is written with fewer digits for some labels than for others",
+    },
+    "If it is a time or a counter, or is not measured apart from that number, ": {
+        "rising": "every line has more than the one before, or every line less",
+        "target": "the number to predict determines it, as in another unit or for a known object",
+    },
 }
-"""Why a column may reveal the labels, or the number to predict: what shows it, and what to do about it."""
+"""What to do about a column that may reveal the labels, or the number to predict, by what shows it."""
 
 
 def doubts(
@@ -162,12 +140,9 @@ def doubts(
         if target is not None:
             reasons = [*_of_target(numbers[name], np.array(target.values)[lines])]
         else:
-            missing = np.isnan(table.columns(columns.columns_of(name)[:1]).values[:, 0]).tolist()
             reasons = [*_of_recording(columns, name, labels)]
-            reasons += ["missing"] if says_of_labels(missing, labels) else []
-            reasons += (
-                _of_numbers(name, columns.units[name], numbers[name], labels) if name in numbers else []
-            )
+            if name in numbers:
+                reasons += _of_numbers(name, columns.units[name], numbers[name], labels)
         for reason in reasons:
             doubted.setdefault(reason, []).append(name)
     if target is None:
@@ -175,7 +150,8 @@ def doubts(
     leave_out = f"leave it out ({option('features', python='columns')})"
     notes = [
         f"used, although {what}: {listed(doubted[reason])}. {advice}{leave_out}"
-        for reason, (what, advice) in _DOUBTS.items()
+        for advice, shown in _DOUBTS.items()
+        for reason, what in shown.items()
         if doubted.get(reason)
     ]
     return notes + _mixed(numbers) + list(_pads_apart(numbers))
@@ -193,18 +169,18 @@ def not_held_out(columns: CsvColumns, names: Sequence[str], instances: Sequence[
 
 def _of_recording(columns: CsvColumns, name: str, labels: Sequence[str]) -> Iterator[str]:
     """Yield why the texts of a column may tell of labels, devices or objects."""
-    cells, is_number = columns.cells[name], is_count(columns.units[name])
-    if says_the_label(cells, labels) or (
-        is_number and not columns.is_nominal(name) and is_code(columns.numbers(name), labels)
-    ):
+    cells, nominal, is_number = columns.cells[name], columns.is_nominal(name), is_count(columns.units[name])
+    values = columns.texts(name) if nominal else columns.numbers(name)
+    if says_the_label(cells, labels) or (not nominal and is_number and is_code(values, labels)):
         yield "same"
         return
     if mostly_says_the_label(cells, labels):
         yield "mostly"
-    values = cells if columns.is_nominal(name) else columns.numbers(name)
+    if mostly_says_the_label([value == "" or value != value for value in values], labels, 1.0 - _FEW):
+        yield "missing"
     if name_objects(cells, labels) or (is_number and values_have_one_label(values, labels)):
         yield "one label"
-    if (columns.is_nominal(name) or is_number) and in_one_block_each(cells, labels):
+    if (nominal or is_number) and in_one_block_each(cells, labels):
         yield "blocks"
 
 
@@ -213,12 +189,11 @@ def _of_numbers(name: str, unit: str, values: Numbers, labels: Sequence[str]) ->
     of_time, differs = is_count(unit) or is_time(unit), differs_by_label(values, labels)
     if (differs or are_in_blocks(labels)) and follow_lines(values, labels):
         yield "order"
-    words = set(words_of(name))
-    if of_time and (names_a_time(name) or can_be_days(values)):
+    if of_time and (names_only(name, _TIME_NAMES, _OF_TIMES) or can_be_days(values)):
         yield "time"
-    if is_result(name, labels if differs else ()):
+    if is_count(unit) and is_result(name, labels if differs else ()):
         yield "result"
-    if differs and (_OF_A_SESSION & words or unit in _TEMPERATURES):
+    if differs and (_OF_A_SESSION & set(words_of(name)) or unit in _TEMPERATURES):
         yield "session"
     if of_time and passes_without_a_gap(values, labels):
         yield "without a gap"
@@ -240,32 +215,26 @@ def _probabilities(numbers: dict[str, Numbers], labels: Sequence[str]) -> Iterat
 
 def _of_target(values: Numbers, target: Numbers) -> Iterator[str]:
     """Yield why the numbers of a column may be the number to predict itself, or when it was measured."""
-    if keeps_rising(values):
+    if len(values) > 2 * LEAST_LINES and one_way(values) == 1.0:
         yield "rising"
     if follows_from(values, target):
         yield "target"
 
 
-def keeps_rising(values: Sequence[float] | Numbers) -> bool:
-    """Return whether each value is larger than the one before, or each is smaller, in lines that are not few."""
-    steps = np.diff(np.array(values, dtype=np.float64))
-    return len(steps) >= 2 * LEAST_LINES and bool((steps > 0.0).all() or (steps < 0.0).all())
-
-
-def mostly_says_the_label(values: Sequence[Hashable], labels: Sequence[str]) -> bool:
-    """Return whether each label, of lines that are not few, has one of few values in most of its lines.
+def mostly_says_the_label(values: Sequence[Hashable], labels: Sequence[str], share: float = _MOSTLY) -> bool:
+    """Return whether each label, of lines that are not few, has one of few values in this share of its lines.
 
     Few lines have another value, as where each label was recorded by its operator or at its level of force.
     """
     counts = Counter(labels)
     pairs = Counter(zip(values, labels, strict=True))
-    usual = {label: value for (value, label), n in pairs.items() if n >= _MOSTLY * counts[label]}
+    usual = {label: value for (value, label), n in pairs.items() if n >= share * counts[label]}
     others = sum(n for (value, _), n in pairs.items() if value not in usual.values())
     few = others <= _FEW * len(labels) and min(counts.values()) >= LEAST_LINES
     return few and len(usual) == len(counts) and len(set(usual.values())) > 1
 
 
-def is_code(values: Sequence[float], labels: Sequence[str]) -> bool:
+def is_code(values: Sequence[Any], labels: Sequence[str]) -> bool:
     """Return whether the values of each label are near to a whole number of its own, and these follow each other."""
     codes = np.round(values)
     near = bool((np.abs(codes - values) <= _NEAR).all())
@@ -277,21 +246,12 @@ def is_result(name: str, labels: Sequence[str]) -> bool:
     words = words_of(name)
     parts = [words_of(label) for label in set(labels)]
     of_label = any(len("".join(part)) >= _LONG_WORD and {*part} <= {*words} for part in parts)
-    return of_label or "".join(words) in _RESULTS or bool(_RESULTS & {*words} and {*words} <= _OF_RESULTS)
+    return of_label or "".join(words) in _RESULTS or names_only(name, _RESULTS, _OF_RESULTS)
 
 
 def are_in_blocks(labels: Sequence[str]) -> bool:
     """Return whether the lines of a label mostly come one after the other, so that what drifts can tell labels."""
     return LEAST_LINES * sum(1 for _ in groupby(labels)) <= len(labels)
-
-
-def says_of_labels(values: Sequence[bool], labels: Sequence[str]) -> bool:
-    """Return whether nearly all lines of some labels have one of two values, and nearly all of the others the other."""
-    counts = Counter(labels)
-    having = Counter(label for value, label in zip(values, labels, strict=True) if value)
-    shares = [having[label] / count for label, count in counts.items()]
-    telling = all(min(share, 1.0 - share) <= _FEW for share in shares)
-    return telling and min(shares) < 0.5 < max(shares) and min(counts.values()) >= LEAST_LINES
 
 
 def digits_tell_labels(values: Numbers, labels: Sequence[str]) -> bool:

@@ -25,7 +25,7 @@ from graspsense.core.values.errors import ConfigError, DataDamaged, listed
 from graspsense.core.values.features import UNKNOWN, FeatureTable
 from graspsense.core.values.label_text import is_missing_label, label_text
 from graspsense.core.values.nominal import splits_of
-from graspsense.core.values.written_numbers import is_missing
+from graspsense.core.values.written_numbers import NotNumbers, is_missing
 from graspsense.recording.controls import Controls, controls
 from graspsense.sources.formats.arff_columns import ArffColumns
 from graspsense.sources.formats.csv_columns import CsvColumns
@@ -33,11 +33,9 @@ from graspsense.sources.trial_table.doubtful_columns import doubts, not_held_out
 from graspsense.sources.trial_table.exported_table import ExportedTable, exported
 from graspsense.sources.trial_table.identifiers import (
     OF_OBJECTS,
-    OF_ORDER,
     groups_trials,
     identifies,
     names_a_recording,
-    names_a_time,
     text_identifies,
 )
 from graspsense.sources.trial_table.summary_lines import without_summaries
@@ -295,10 +293,10 @@ def _no_order(columns: CsvColumns, reserved: set[str], identified: Callable[[str
         name
         for name in columns.names
         if name not in reserved
-        and (times := columns.times_or_none(name)) is not None
+        and not isinstance(times := columns.numbers_or_times(name), NotNumbers)
         and len(set(times[np.isfinite(times)].tolist())) == len(times)
         and (np.diff(times) < 0.0).any()
-        and (names_a_time(name) or identified(name) in OF_ORDER)
+        and identified(name)
     ]
     named = f". If it is that of {listed(able)}, name it ({option('order', 'COLUMN')})" if able else ""
     return f"no column names the order of recording: the order of the lines is used{named}"

@@ -34,12 +34,6 @@ TIMES: Final = frozenset({
     "s", "sec", "secs", "second", "seconds", "ms", "msec", "us", "µs", "ns", "min", "mins", "minute", "minutes",
     "h", "hr", "hrs", "hour", "hours", "d", "day", "days",
 })  # fmt: skip
-_TIME_NAMES: Final = frozenset({
-    "t", "time", "elapsed", "clock", "hour", "hours", "minute", "minutes", "timestamp"
-})  # fmt: skip
-_OF_TIMES: Final = TIMES | {
-    "rec", "recorded", "recording", "start", "begin", "end", "at", "of", "day", "since", "total",
-}  # fmt: skip
 _NAMES: Final = frozenset({
     "id", "uid", "uuid", "index", "idx", "number", "num", "no", "nr", "trial", "run", "row", "line", "record",
     "seq", "sequence", "serial", "counter", "file", "filename", "session", "date", "timestamp", "time",
@@ -97,12 +91,6 @@ _LONGEST_S: Final = 3.2e8
 NAME_OBJECTS: Final = "name the objects (say so by --instance)"
 NUMBER_OBJECTS: Final = "number the objects (name them by --instance)"
 NAME_THINGS: Final = "name the objects, which have several labels (say so by --instance)"
-DATES: Final = "are dates or times"
-FOLLOW: Final = "follow the order of the lines as a counter or a time does"
-NUMBER_TRIALS: Final = "number the trials"
-EQUAL_STEPS: Final = "have equal steps, as those of a clock or a counter"
-OF_ORDER: Final = (DATES, FOLLOW, NUMBER_TRIALS, EQUAL_STEPS)
-"""How the values of a column can tell the order of recording."""
 OF_OBJECTS: Final = (NAME_OBJECTS, NUMBER_OBJECTS)
 """How the values of a column identify trials that are of the same object."""
 _MOST_VALUES: Final = 1.0 / 3.0
@@ -136,14 +124,13 @@ def names_a_recording(name: str) -> bool:
     >>> names_a_recording("session_id"), names_a_recording("trial"), names_a_recording("robot_force")
     (True, True, False)
     """
-    words = set(words_of(name))
-    return bool(words & _OF_RECORDINGS) and words <= _OF_RECORDINGS | _NUMBERED
+    return names_only(name, _OF_RECORDINGS, _NUMBERED)
 
 
-def names_a_time(name: str) -> bool:
-    """Return whether a heading says that a time is in the column, and of nothing but the recording."""
+def names_only(name: str, telling: frozenset[str], further: frozenset[str]) -> bool:
+    """Return whether a heading has one of these words, and besides them only further ones."""
     words = set(words_of(name))
-    return bool(_TIME_NAMES & words) and words <= _TIME_NAMES | _OF_TIMES
+    return bool(words & telling) and words <= telling | further
 
 
 def groups_trials(name: str, values: Sequence[str], instances: Sequence[str] | None = None) -> bool:
@@ -173,7 +160,7 @@ def identifies(
     if len(column) < LEAST_LINES or column.min() == column.max() or np.abs(column).max() > LARGEST_VALUE:
         return ""
     if _is_calendar(column):
-        return DATES
+        return "are dates or times"
     whole = bool((column == np.floor(column)).all())
     values_of = np.unique(column)
     cells = cells_in_range(values_of) + 1.0
@@ -183,22 +170,23 @@ def identifies(
     if (hashed or cells <= 2.0 * len(values_of)) and name_objects(column.tolist(), known):
         return NUMBER_OBJECTS
     named = bool(_NAMES & set(words_of(name)))
-    orders = (given, None if order is None else np.array(order)[given])
-    if (whole or named) and any(lines is not None and _begins_anew(column, lines) for lines in orders):
-        return FOLLOW
-    if len(set(zip(column.tolist(), known, strict=True))) >= (1.0 - _TIES) * len(column):
-        for lines in orders:
-            if lines is not None and (
-                (_follows(column, lines, known) and (whole or named or _is_regular(values_of)))
-                or (is_time(unit) and _follows_in_labels(column, lines, known))
-            ):
-                return FOLLOW
+    different = len(set(zip(column.tolist(), known, strict=True))) >= (1.0 - _TIES) * len(column)
+    for lines in [given] if order is None else [given, np.array(order)[given]]:
+        way, in_labels = one_way(column[np.argsort(lines)]), _follows_in_labels(column, lines, known)
+        # A counter of a byte begins anew.
+        counts = len(values_of) >= _COUNTING and way >= 1.0 - _TIES
+        follows = different and (way == 1.0 or in_labels)
+        if (follows and (whole or named or _is_regular(values_of) or (is_time(unit) and in_labels))) or (
+            counts and (whole or named)
+        ):
+            return "follow the order of the lines as a counter or a time does"
+    if different:
         if _hardly_repeats(len(column), len(values_of), cells) or (
             named and whole and len(values_of) == len(column)
         ):
-            return NUMBER_TRIALS
+            return "number the trials"
         if len(values_of) == len(column) >= _SPACED and _is_regular(values_of, _ALIKE):
-            return EQUAL_STEPS
+            return "have equal steps, as those of a clock or a counter"
     return ""
 
 
@@ -216,7 +204,7 @@ def text_identifies(texts: Sequence[str], labels: Sequence[str]) -> str:
     lower = [text.lower() for text in counts]
     of_words = len(counts) > 2 and all(map(_WORDS_OF_DATES.fullmatch, lower))
     if of_words or all(map(_DATE_TEXT.fullmatch, lower)):
-        return DATES
+        return "are dates or times"
     values, own = [text for text, _ in given], [label for _, label in given]
     numbered = all(re.search(r"\d", text) for text in counts)
     hardly = len(counts) > max(2, len(given) * _MOST_VALUES)
@@ -280,18 +268,10 @@ def can_be_days(values: NDArray[np.float64]) -> bool:
     return any(low <= known.min() and known.max() <= high for low, high in _DAYS)
 
 
-def _follows(column: NDArray[np.float64], lines: NDArray[np.int64], labels: Sequence[str]) -> bool:
-    """Return whether the values rise, or fall, with these positions within each label, or over all of them."""
-    steps = np.diff(column[np.argsort(lines)])
-    return bool((steps > 0.0).all() or (steps < 0.0).all()) or _follows_in_labels(column, lines, labels)
-
-
-def _begins_anew(column: NDArray[np.float64], lines: NDArray[np.int64]) -> bool:
-    """Return whether nearly all values are larger, or smaller, than the one before, as those of a counter of a byte."""
-    steps = np.diff(column[np.argsort(lines)])
-    return (
-        len(np.unique(column)) >= _COUNTING and max((steps > 0.0).mean(), (steps < 0.0).mean()) >= 1.0 - _TIES
-    )
+def one_way(values: NDArray[np.float64]) -> float:
+    """Return the share of values that are larger than the one before, or smaller, if these are more."""
+    steps = np.diff(values)
+    return float(max((steps > 0.0).mean(), (steps < 0.0).mean()))
 
 
 def _follows_in_labels(column: NDArray[np.float64], lines: NDArray[np.int64], labels: Sequence[str]) -> bool:
