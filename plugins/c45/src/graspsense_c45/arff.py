@@ -25,8 +25,6 @@ MOST_ATTRIBUTES = 10_000
 """Limit on the attributes, and on the values of one, of a file."""
 MOST_NAMED = 24
 """Limit on the names that an error lists."""
-LONGEST_INDEX = 9
-"""Limit on the digits of the index in a sparse row."""
 LONGEST_SHOWN = 60
 """Limit on the characters of a text that an error repeats."""
 
@@ -164,7 +162,7 @@ class _Reader:
     def _sparse(self, tokens: Sequence[Token]) -> list[Token]:
         cells = [("0" if a.values is None else a.values[0], False) for a in self._attributes]
         for (index, _), cell in zip(tokens[::2], tokens[1::2], strict=False):
-            if not (index.isdecimal() and len(index) <= LONGEST_INDEX) or int(index) >= len(cells):
+            if not index.isdecimal() or len(index) > len(str(len(cells))) or int(index) >= len(cells):
                 raise self._error(f"sparse index {index[:LONGEST_SHOWN]!r}; allowed: 0..{len(cells) - 1}")
             cells[int(index)] = cell
         return cells

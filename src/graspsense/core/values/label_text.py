@@ -69,8 +69,8 @@ def spelled_alike(texts: Iterable[str]) -> list[tuple[str, str]]:
     by_form: dict[str, str] = {}
     pairs = []
     for text in sorted(set(texts)):
-        form = unicodedata.normalize("NFKC", text.translate(_LOOK_ALIKE)).translate(_LOOK_ALIKE).casefold()
-        form = _ACCENTS.sub("", unicodedata.normalize("NFKD", form))
+        form = unicodedata.normalize("NFKD", text.translate(_LOOK_ALIKE)).translate(_LOOK_ALIKE).casefold()
+        form = _ACCENTS.sub("", form)
         form = _LEADING.sub("", _JOINTS.sub("", form.strip(_QUOTES)))
         form = _LAST_ZEROS.sub(r"\1", form)
         other = by_form.setdefault(form, text)

@@ -19,7 +19,6 @@ import numpy as np
 from graspsense.core.components.caller import option
 from graspsense.core.learn.confounding import LEAST_LINES, says_the_label
 from graspsense.core.values.errors import counted, listed
-from graspsense.core.values.features import LARGEST_VALUE
 from graspsense.sources.columns.column_guess import words_of
 from graspsense.sources.trial_table.identifiers import (
     TIMES,
@@ -121,6 +120,7 @@ _DOUBTS: Final[Mapping[str, Mapping[str, str]]] = {
 """What to do about a column that may reveal the labels, or the number to predict, by what shows it."""
 
 
+@np.errstate(over="ignore", invalid="ignore")  # of numbers that no sensor gives
 def doubts(
     columns: CsvColumns,
     labels: Sequence[str],
@@ -134,7 +134,7 @@ def doubts(
     """
     columns, table, labels = columns.rows(lines), table.rows(np.array(lines)), [labels[i] for i in lines]
     used = [name for name in columns.names if set(columns.columns_of(name)) <= set(table.names)]
-    numbers = _numbers(columns, [name for name in used if not columns.is_nominal(name)])
+    numbers = {name: np.array(columns.numbers(name)) for name in used if not columns.is_nominal(name)}
     doubted: dict[str, list[str]] = {}
     for name in used if target is None else numbers:
         if target is not None:
@@ -359,13 +359,6 @@ def follows_from(values: Numbers, target: Numbers) -> bool:
     return pairs == of_target and bool(rises) and len(set(values.tolist())) >= LEAST_LINES
 
 
-def _numbers(columns: CsvColumns, names: Sequence[str]) -> dict[str, Numbers]:
-    """Return these columns of numbers, without those that are too large to learn from."""
-    numbers = {name: np.array(columns.numbers(name)) for name in names}
-    return {name: values for name, values in numbers.items() if not (np.abs(values) > LARGEST_VALUE).any()}
-
-
-@np.errstate(over="ignore")  # of differences and ratios of numbers that no sensor gives
 def _mixed(numbers: dict[str, Numbers]) -> list[str]:
     """Return notes on columns in which a number stands for something else, or whose unit changes."""
     notes = []
@@ -413,20 +406,16 @@ def stand_in_of(known: Numbers) -> float | None:
     if times < _OFTEN:
         value = float(known[np.abs(known - np.median(known)).argmax()])
     others = known[known != value]
-    if len(np.unique(others)) < LEAST_LINES:
+    repeats = np.unique(others, return_counts=True)[1]
+    if len(repeats) < LEAST_LINES:
         return None
     span = float(others.max() - others.min()) * (1.0 if times >= _OFTEN else _LONE)
     far = value < others.min() - span or value > others.max() + span
     apart = value != 0.0 or float(np.abs(others).min()) > _FROM_ZERO * float(np.ptp(others))
     often = times >= (LEAST_LINES if value else _OFTEN)
-    stuck = often and apart and _mostly_different(others)
+    different = int(repeats.max()) <= 2 and len(repeats) > (1.0 - _FEW) * len(others)
+    stuck = often and apart and different
     return float(value) if far or stuck else None
-
-
-def _mostly_different(values: Numbers) -> bool:
-    """Return whether no value is that of more than two lines, and few are those of two."""
-    counts = np.unique(values, return_counts=True)[1]
-    return len(values) >= LEAST_LINES and int(counts.max()) <= 2 and len(counts) > (1.0 - _FEW) * len(values)
 
 
 def unit_changes(known: Numbers) -> bool:
