@@ -128,14 +128,11 @@ class _Reader:
         if len(self._attributes) >= MOST_ATTRIBUTES:
             raise self._error(f"a table has at most {MOST_ATTRIBUTES} attributes, and this has more")
         if tokens[1] == _OPEN:
-            if tokens[-1] != _CLOSE:
-                raise self._error(
-                    f"the values of {name!r} do not end with }}, or are more than {MOST_ATTRIBUTES}"
-                )
             values = tuple(value for value, _ in tokens[2:-1])
-            if len(set(values)) != len(values) or not values:
+            if tokens[-1] != _CLOSE or len(set(values)) != len(values) or not values:
                 raise self._error(
-                    f"the values of {name!r} are {_listed(values)}; there must be some, each once"
+                    f"the values of {name!r} are {_listed(values)}; there must be some, each once, at most "
+                    f"{MOST_ATTRIBUTES}, and }} behind them"
                 )
             self._attributes.append(Attribute(name, values=values))
             self._codes.append({value: code for code, value in enumerate(values)})

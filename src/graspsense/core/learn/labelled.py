@@ -219,7 +219,7 @@ def _refuse_too_large(names: Sequence[str], rows: ArrayLike, source: str) -> Non
         raise DataDamaged(
             f"{source}: {names[column]!r} of trial {trial + 1} is {values[trial, column]:g}: the largest magnitude to "
             f"learn from, or to predict, is {LARGEST_VALUE:g}. Correct it, or leave a feature out "
-            f"({option('features', python='columns')})"
+            f"({option('features', '-NAME', python='columns')})"
         )
 
 

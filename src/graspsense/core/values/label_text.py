@@ -20,16 +20,14 @@ _JOINTS: Final = re.compile(
 """Spaces, underscores, hyphens and signs between words, beside a letter."""
 _LEADING: Final = re.compile(r"(?<![\d.])0+(?=\d)")
 _FILLERS: Final = re.compile(
-    "[\u034f\u115f\u1160\u17b4\u17b5\u180b-\u180f\u3164\ufe00-\ufe0f\uffa0\U000e0100-\U000e01ef]"
+    "[\u034f\u0640\u115f\u1160\u17b4\u17b5\u180b-\u180f\u3164\ufe00-\ufe0f\uffa0\U000e0100-\U000e01ef]"
 )
-"""Letters and marks that nothing shows."""
+"""Letters and marks that nothing shows, and the Arabic stroke that only lengthens a word."""
 _LOOK_ALIKE: Final = str.maketrans(
     "АВЕКМНОРСТУХІЈЅаеорсухіјѕһԁԛԝ" + "ΑΒΕΖΗΙΚΜΝΟΡΤΥΧαονρυικτχ" + "ıɡℓ,",
     "ABEKMHOPCTYXIJSaeopcyxijshdqw" + "ABEZHIKMNOPTYXaovpuiktx" + "igl.",
-    "\u0640",
 )
-"""Cyrillic, Greek and other letters, the Latin ones that they look like, the decimal comma, and the Arabic stroke that
-makes a word longer."""
+"""Cyrillic, Greek and other letters, the Latin ones that they look like, and the decimal comma."""
 _ACCENTS: Final = re.compile("(?<=[a-z])[\u0300-\u036f]+")
 _QUOTES: Final = " .'`\"\u00ab\u00bb\u2018\u2019\u201a\u201c\u201d\u201e\u2039\u203a"
 _LAST_ZEROS: Final = re.compile(r"(?<!\d)(\d+\.\d*[1-9])0+(?![\d.])")

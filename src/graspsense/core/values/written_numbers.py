@@ -243,9 +243,7 @@ def _common(cells: Sequence[str]) -> int | NotNumbers:
     bracketed = [cell.startswith("(") for cell in cells if not is_missing(cell)]
     if bracketed and all(bracketed):
         return NotNumbers(
-            0,
-            cells[0],
-            "and all cells have parentheses or a minus sign behind them: write the minus sign first",
+            0, cells[0], "and all cells have parentheses or a minus sign last: write the minus sign first"
         )
     return common or _mixed(cells)
 

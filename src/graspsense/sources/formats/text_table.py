@@ -232,7 +232,7 @@ class _Layout:
             named = self._names_in_comment(width)
             if named is not None:
                 return named[1], named[2], 0, named[0]
-            if all(is_number(cell) or is_missing(cell) for cell in top):
+            if _are_numbers(top):
                 ordinals = [*map(str, range(width))]
                 if numbered := width > 2 and top in (ordinals, ["", *ordinals[:-1]]):
                     self._tell([self.rows[0][0]], "lines that number the columns")
@@ -342,11 +342,7 @@ class _Layout:
 
     def _refuse_numbers_before(self, names: int) -> None:
         """Raise DataDamaged if rows of numbers that may be a part of the data come before the row `names`."""
-        numbers = [
-            number
-            for number, row in self.rows[:names]
-            if len(row) > 1 and all(is_number(cell) or is_missing(cell) for cell in row)
-        ]
+        numbers = [number for number, row in self.rows[:names] if len(row) > 1 and _are_numbers(row)]
         if len(numbers) > max(_FEW_BEFORE, _MOST_BEFORE * (len(self.rows) - names)):
             raise DataDamaged(
                 f"{self.path}: line {self.rows[names][0]} names the columns of the lines after it, and {len(numbers)} "
@@ -551,8 +547,9 @@ def _separator(lines: Sequence[str]) -> str:
     """
     widths = {separator: _width(lines, separator) for separator in _SEPARATORS}
     agreeing = {separator: count for separator, (width, count) in widths.items() if width > 1}
-    if agreeing.get(" ", 0) >= agreeing.get(",", 1) and _commas_are_within_numbers(lines):
-        agreeing.pop(",", None)
+    spaces_agree = agreeing.get(" ", 0) >= agreeing.get(",", 1)
+    if spaces_agree and 2 * sum(map(_are_numbers, map(str.split, lines))) >= len(lines):
+        agreeing.pop(",", None)  # it is within numbers, as in `1,5 2,5`
     able = [separator for separator, count in agreeing.items() if count >= 0.9 * max(agreeing.values())]
     fitting = [item for item in able if _width(lines[:1], item)[0] == widths[item][0]]
     return next(iter(fitting or able), "\x1f")
@@ -567,10 +564,9 @@ def _words(line: str, separator: str) -> list[str]:
     return [quoted or word for quoted, word in re.findall(r'"([^"]*)"(?!\S)|(\S+)', line)]
 
 
-def _commas_are_within_numbers(lines: Sequence[str]) -> bool:
-    """Return whether spaces separate numbers with commas, as in `1,5 2,5`, in most lines."""
-    numbers = sum(all(is_number(word) or is_missing(word) for word in line.split()) for line in lines)
-    return 2 * numbers >= len(lines)
+def _are_numbers(cells: Sequence[str]) -> bool:
+    """Return whether every cell is a number or missing."""
+    return all(is_number(cell) or is_missing(cell) for cell in cells)
 
 
 def _width(lines: Sequence[str], separator: str) -> tuple[int, int]:

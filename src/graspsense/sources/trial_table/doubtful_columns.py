@@ -26,7 +26,6 @@ from graspsense.sources.trial_table.identifiers import (
     can_be_days,
     follow_lines,
     groups_of_labels,
-    groups_trials,
     is_count,
     is_time,
     name_objects,
@@ -147,7 +146,7 @@ def doubts(
             doubted.setdefault(reason, []).append(name)
     if target is None:
         doubted["probabilities"] = [*_probabilities(numbers, labels)]
-    leave_out = f"leave it out ({option('features', python='columns')})"
+    leave_out = f"leave it out ({option('features', '-NAME', python='columns')})"
     notes = [
         f"used, although {what}: {listed(doubted[reason])}. {advice}{leave_out}"
         for advice, shown in _DOUBTS.items()
@@ -155,16 +154,6 @@ def doubts(
         if doubted.get(reason)
     ]
     return notes + _mixed(numbers) + list(_pads_apart(numbers))
-
-
-def not_held_out(columns: CsvColumns, names: Sequence[str], instances: Sequence[str] | None) -> list[str]:
-    """Return notes on those of these columns whose sessions, operators or devices are in training and test data."""
-    return [
-        f"not held out: trials of one {name} are in training and test data. If it matters, a further {name} is "
-        f"recognised less often than told; {option('instance', name)} holds it out"
-        for name in names
-        if groups_trials(name, columns.texts(name), instances)
-    ]
 
 
 def _of_recording(columns: CsvColumns, name: str, labels: Sequence[str]) -> Iterator[str]:
@@ -187,7 +176,9 @@ def _of_recording(columns: CsvColumns, name: str, labels: Sequence[str]) -> Iter
 def _of_numbers(name: str, unit: str, values: Numbers, labels: Sequence[str]) -> Iterator[str]:
     """Yield why the numbers of a column may tell of the time of recording, or of how they were written."""
     of_time, differs = is_count(unit) or is_time(unit), differs_by_label(values, labels)
-    if (differs or are_in_blocks(labels)) and follow_lines(values, labels):
+    # Where the lines of a label mostly come one after the other, what drifts can tell labels.
+    in_blocks = LEAST_LINES * sum(1 for _ in groupby(labels)) <= len(labels)
+    if (differs or in_blocks) and follow_lines(values, labels):
         yield "order"
     if of_time and (names_only(name, _TIME_NAMES, _OF_TIMES) or can_be_days(values)):
         yield "time"
@@ -247,11 +238,6 @@ def is_result(name: str, labels: Sequence[str]) -> bool:
     parts = [words_of(label) for label in set(labels)]
     of_label = any(len("".join(part)) >= _LONG_WORD and {*part} <= {*words} for part in parts)
     return of_label or "".join(words) in _RESULTS or names_only(name, _RESULTS, _OF_RESULTS)
-
-
-def are_in_blocks(labels: Sequence[str]) -> bool:
-    """Return whether the lines of a label mostly come one after the other, so that what drifts can tell labels."""
-    return LEAST_LINES * sum(1 for _ in groupby(labels)) <= len(labels)
 
 
 def digits_tell_labels(values: Numbers, labels: Sequence[str]) -> bool:

@@ -280,8 +280,7 @@ def _follows_in_labels(column: NDArray[np.float64], lines: NDArray[np.int64], la
     sizes = Counter(np.bincount(codes).tolist())
     if sum(times * math.lgamma(size + 1) for size, times in sizes.items()) < math.log(_ORDERS):
         return False
-    ranks, places = _ranks(column, codes), _ranks(lines.astype(np.float64), codes)
-    return abs(_correlation(ranks, places)) >= _FOLLOWS
+    return abs(_rank_correlation(column, lines.astype(np.float64), codes)) >= _FOLLOWS
 
 
 def follow_lines(values: NDArray[np.float64], labels: Sequence[str]) -> bool:
@@ -301,12 +300,15 @@ def follow_lines(values: NDArray[np.float64], labels: Sequence[str]) -> bool:
     within = (_ranks(lines, codes) + (counts[codes] - 1) / 2.0).astype(np.int64)
     parts = codes * len(given) + within // LEAST_LINES
     parts = np.unique(parts, return_inverse=True)[1]
-    whole, near = (_correlation(_ranks(column, groups), _ranks(lines, groups)) for groups in (codes, parts))
+    whole, near = (_rank_correlation(column, lines, groups) for groups in (codes, parts))
     return abs(whole) >= _DRIFTS and whole * near > 0.0 and abs(near) >= _DRIFTS_NEAR
 
 
-def _correlation(ranks: NDArray[np.float64], places: NDArray[np.float64]) -> float:
-    """Return the correlation of numbers whose means are zero; 0 if those of one do not differ."""
+def _rank_correlation(
+    values: NDArray[np.float64], lines: NDArray[np.float64], codes: NDArray[np.int64]
+) -> float:
+    """Return the correlation of the ranks within groups; 0 if those of one do not differ."""
+    ranks, places = _ranks(values, codes), _ranks(lines, codes)
     scale = math.sqrt(float(ranks @ ranks) * float(places @ places))
     return float(ranks @ places) / scale if scale > 0.0 else 0.0
 
