@@ -132,7 +132,7 @@ class _Reader:
             if tokens[-1] != _CLOSE or len(set(values)) != len(values) or not values:
                 raise self._error(
                     f"the values of {name!r} are {_listed(values)}; there must be some, each once, at most "
-                    f"{MOST_ATTRIBUTES}, and }} behind them"
+                    f"{MOST_ATTRIBUTES}, and end with }}"
                 )
             self._attributes.append(Attribute(name, values=values))
             self._codes.append({value: code for code, value in enumerate(values)})

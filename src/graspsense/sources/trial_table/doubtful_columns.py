@@ -72,8 +72,6 @@ _MOSTLY: Final = 0.75
 """Share of the lines of each label from which on a value may be the setting that this label was recorded with."""
 _NEAR: Final = 0.3
 """Largest distance of a number from the whole one that it is rounded to."""
-_LONG_WORD: Final = 3
-"""Characters from which on a label in a heading is no chance."""
 _ROUNDED_SUM: Final = 0.02
 """Largest error of a sum of probabilities."""
 _ENOUGH_LINES: Final = 30
@@ -131,7 +129,7 @@ def doubts(
 
     `lines` are those to be looked at, in the order of recording.
     """
-    columns, table, labels = columns.rows(lines), table.rows(np.array(lines)), [labels[i] for i in lines]
+    columns, labels = columns.rows(lines), [labels[i] for i in lines]
     used = [name for name in columns.names if set(columns.columns_of(name)) <= set(table.names)]
     numbers = {name: np.array(columns.numbers(name)) for name in used if not columns.is_nominal(name)}
     doubted: dict[str, list[str]] = {}
@@ -146,9 +144,9 @@ def doubts(
             doubted.setdefault(reason, []).append(name)
     if target is None:
         doubted["probabilities"] = [*_probabilities(numbers, labels)]
-    leave_out = f"leave it out ({option('features', '-NAME', python='columns')})"
+    out = option("features", "-NAME", python="columns")
     notes = [
-        f"used, although {what}: {listed(doubted[reason])}. {advice}{leave_out}"
+        f"used, although {what}: {listed(doubted[reason])}. {advice}leave it out ({out})"
         for advice, shown in _DOUBTS.items()
         for reason, what in shown.items()
         if doubted.get(reason)
@@ -236,7 +234,8 @@ def is_result(name: str, labels: Sequence[str]) -> bool:
     """Return whether a heading is that of the result of a model or a test, or has a label in it, as `score_can`."""
     words = words_of(name)
     parts = [words_of(label) for label in set(labels)]
-    of_label = any(len("".join(part)) >= _LONG_WORD and {*part} <= {*words} for part in parts)
+    # One or two letters of a label are in a heading by chance.
+    of_label = any(len("".join(part)) > 2 and {*part} <= {*words} for part in parts)
     return of_label or "".join(words) in _RESULTS or names_only(name, _RESULTS, _OF_RESULTS)
 
 

@@ -11,7 +11,6 @@ import math
 from collections import Counter
 from collections.abc import Callable, Sequence
 from functools import cache
-from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -362,8 +361,8 @@ def _feature_table(
 
 def _with_patterns(given: Sequence[str], names: Sequence[str]) -> list[str]:
     """Return these names, each once, with all that a pattern such as `pad_*` fits in its place."""
-    fitting = ([text] if text in names else fnmatch.filter(names, text) or [text] for text in given)
-    return list(dict.fromkeys(chain.from_iterable(fitting)))
+    fitting = {text: [text] if text in names else fnmatch.filter(names, text) or [text] for text in given}
+    return list(dict.fromkeys(name for text in given for name in fitting[text]))
 
 
 def _feature_names(
