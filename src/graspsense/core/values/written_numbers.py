@@ -132,8 +132,9 @@ def plain_text(cell: str) -> str:
     if "10" in cell:
         cell = _POWER.sub(lambda match: f"e{unicodedata.normalize('NFKC', match[1] or match[2])}", cell)
     if not cell.isascii():
-        plain = (unicodedata.decimal(sign, sign) for sign in cell.translate(_PLAIN_SIGNS))
-        cell = "".join(map(str, plain)).strip()
+        cell = cell.translate(_PLAIN_SIGNS).strip()
+    if not cell.isascii():  # digits of other scripts
+        cell = "".join(str(unicodedata.decimal(sign, sign)) for sign in cell)
     if "~" in cell or "\u00b1" in cell or "+" in cell or "(" in cell:
         cell = _ABOUT.sub("", cell)
     if cell.endswith("-") and cell[0].isdigit():

@@ -196,8 +196,7 @@ def _probabilities(numbers: dict[str, Numbers], labels: Sequence[str]) -> Iterat
     for begin in range(len(names) - n + 1):
         group = names[begin : begin + n]
         values = np.array([numbers[name] for name in group])
-        sums = values.sum(axis=0)
-        shares = n > 1 and (values >= 0.0).all() and (np.abs(sums - 1.0) <= _ROUNDED_SUM).all()
+        shares = n > 1 and (values >= 0.0).all() and (np.abs(values.sum(axis=0) - 1.0) <= _ROUNDED_SUM).all()
         if shares and mostly_says_the_label(values.argmax(axis=0).tolist(), labels):
             yield from group
 

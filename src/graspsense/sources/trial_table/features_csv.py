@@ -98,8 +98,7 @@ def read_labelled(
     reserved = {name for name in (label, instance, order, value) if name}
     if export is None and order is None:
         notes.append(_no_order(columns, reserved, identified))
-    usual = [] if export is None else export.features
-    table = _feature_table(columns, features, usual, reserved, identified, notes)
+    table = _feature_table(columns, features, export.features if export else [], reserved, identified, notes)
     others = [name for name in columns.names if name not in {*reserved, *table.names}]
     if export is None:
         recorded = lines if ranks is None else sorted(lines, key=ranks.__getitem__)

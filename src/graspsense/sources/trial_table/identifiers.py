@@ -176,9 +176,8 @@ def identifies(
         # A counter of a byte begins anew.
         counts = len(values_of) >= _COUNTING and way >= 1.0 - _TIES
         follows = different and (way == 1.0 or in_labels)
-        if (follows and (whole or named or _is_regular(values_of) or (is_time(unit) and in_labels))) or (
-            counts and (whole or named)
-        ):
+        like_clock = _is_regular(values_of) or (is_time(unit) and in_labels)
+        if ((whole or named) and (counts or follows)) or (follows and like_clock):
             return "follow the order of the lines as a counter or a time does"
     if different:
         if _hardly_repeats(len(column), len(values_of), cells) or (
