@@ -224,6 +224,8 @@ OBJECTS = [f"{k},{what},{k * 0.31 % 1:.3f}" for what in ("can", "jar") for k in 
           for full in ("100%", "75%")),
         # An object may have the name of a statistic.
         ([HEAD, *(line.replace("b,", "total,") for line in TRIALS)], ("a", "total") * 4),
+        # Units that are repeated with the names, also of a column of texts.
+        ([HEAD, ",m,N", *TRIALS[:4], HEAD, ",m,N", *TRIALS[4:]], "abababab"),
         # A mean of each object is known by the column of trial numbers.
         (["trial,what,peak", *OBJECTS[:6], "mean,can,0.5", *OBJECTS[6:], "mean,jar,0.5"], ("can",) * 6 + ("jar",) * 6),
         # Trials that are numbered by a sign that begins comments.
@@ -261,6 +263,53 @@ def test_what_is_no_feature_or_is_missing_is_noted(csv, columns, rows, names, no
 
 
 @every_case(
+    ("asked", "names"),
+    [
+        (["pad_*"], ("pad_l", "pad_r")),
+        (["-pad_*"], ("gap", "-x")),
+        (["pad_*", "gap", "-pad_l"], ("pad_r", "gap")),
+        (["-x"], ("-x",)),
+        (["--x", "-gap"], ("pad_l", "pad_r")),
+        (["*"], ("pad_l", "pad_r", "gap", "-x")),
+    ],
+)
+def test_features_are_chosen_by_patterns_and_left_out(csv, asked, names):
+    rows = [f"{'ab'[i % 2]},{i * 7 % 5},{i * 3 % 4},{i % 3},{i * i % 7}" for i in range(12)]
+    path = csv("\n".join(["what,pad_l,pad_r,gap,-x", *rows, ""]))
+    assert read_labelled(path, "what", features=asked).table.names == names
+    for wrong in (["-nix"], ["gap", "-gap"], ["-*"], ["what"]):
+        with pytest.raises(ConfigError):
+            read_labelled(path, "what", features=wrong)
+
+
+def test_a_column_that_tells_another_order_than_the_lines_is_proposed(csv):
+    order = np.random.default_rng(0).permutation(30).tolist()
+    rows = {
+        "elapsed": [f"{60.0 * i:.1f}" for i in order],
+        "made": [f"2026-11-26 10:{i:02d}:00" for i in order],
+        "sorted": [f"2026-11-26 10:{i:02d}:00" for i in range(30)],
+        "force": [f"{force:.3f}" for force in np.random.default_rng(1).normal(size=30)],
+    }
+    lines = [
+        f"{'ab'[i % 2]},{','.join(row)}"
+        for i, row in zip(order, zip(*rows.values(), strict=True), strict=True)
+    ]
+    path = csv("\n".join([f"what,{','.join(rows)}", *lines, ""]))
+    told = next(note for note in read_labelled(path, "what").notes if "order of recording" in note)
+    assert "elapsed" in told
+    assert "made" in told
+    assert "sorted" not in told
+    assert "force" not in told
+    assert not [
+        note for note in read_labelled(path, "what", order="made").notes if "order of recording" in note
+    ]
+
+
+def test_a_heading_in_decomposed_letters_is_that_in_composed_ones(csv):
+    assert read_labelled(csv(GOOD.replace("what", "Beha\u0308lter")), "Beh\u00e4lter").classes == ("a", "b")
+
+
+@every_case(
     "other",
     [
         "Tin_can 1",
@@ -270,6 +319,9 @@ def test_what_is_no_feature_or_is_missing_is_noted(csv, columns, rows, names, no
         "tin c\u0430n 1",
         "\u03a4in can 1",
         "t\u0131n can 1",
+        "t\u00efn can 1",
+        "\u201ctin can 1\u201d",
+        "T\u0130N CAN 1",
     ],
 )
 def test_labels_that_differ_in_spelling_only_are_noted(csv, other):

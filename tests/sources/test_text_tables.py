@@ -74,6 +74,8 @@ VARIANTS = {
     "units in brackets": [HEADER, "[s],[mm],(N),(N)", *ROWS],
     "units and remarks": [HEADER, "s,mm,N,N", ",encoder,left pad,right pad", *ROWS],
     "separator of Excel": ["sep=;", HEADER.replace(",", ";"), *DECIMAL_COMMAS],
+    "repeated header in capitals": [HEADER, *ROWS[:90], HEADER.upper(), *ROWS[90:]],
+    "comments of other programs": ["// made by a logger", f"! {HEADER}", *ROWS],
     "repeated header and units": [HEADER, "s,mm,N,N", *ROWS[:90], HEADER, "s,mm,N,N", *ROWS[90:]],
     "times of the day over midnight": stamped(late),
     "numpy with spaces": ["# made by a logger", "# t pos f1 f2", *(row.replace(",", " ") for row in ROWS)],

@@ -61,7 +61,8 @@ source_options = option_group(
     click.option(
         "--features",
         metavar="COLUMNS",
-        help="CSV: comma-separated feature columns.  [default: all that can be features]",
+        help="CSV: comma-separated feature columns; pad_* is all that begin so, -NAME leaves one out.  [default: all "
+        "that can be features]",
     ),
     click.option(
         "--before",

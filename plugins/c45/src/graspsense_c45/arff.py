@@ -25,8 +25,6 @@ MOST_ATTRIBUTES = 10_000
 """Limit on the attributes, and on the values of one, of a file."""
 MOST_NAMED = 24
 """Limit on the names that an error lists."""
-LONGEST_INDEX = 9
-"""Limit on the digits of the index in a sparse row."""
 LONGEST_SHOWN = 60
 """Limit on the characters of a text that an error repeats."""
 
@@ -130,14 +128,11 @@ class _Reader:
         if len(self._attributes) >= MOST_ATTRIBUTES:
             raise self._error(f"a table has at most {MOST_ATTRIBUTES} attributes, and this has more")
         if tokens[1] == _OPEN:
-            if tokens[-1] != _CLOSE:
-                raise self._error(
-                    f"the values of {name!r} do not end with }}, or are more than {MOST_ATTRIBUTES}"
-                )
             values = tuple(value for value, _ in tokens[2:-1])
-            if len(set(values)) != len(values) or not values:
+            if tokens[-1] != _CLOSE or len(set(values)) != len(values) or not values:
                 raise self._error(
-                    f"the values of {name!r} are {_listed(values)}; there must be some, each once"
+                    f"the values of {name!r} are {_listed(values)}; there must be some, each once, at most "
+                    f"{MOST_ATTRIBUTES}, and end with }}"
                 )
             self._attributes.append(Attribute(name, values=values))
             self._codes.append({value: code for code, value in enumerate(values)})
@@ -152,11 +147,8 @@ class _Reader:
     def _row(self, line: str) -> None:
         tokens = list(self._tokens(line))
         sparse = tokens[:1] == [_OPEN]
-        end = (
-            tokens.index(_CLOSE if sparse else _OPEN)
-            if (_CLOSE if sparse else _OPEN) in tokens
-            else len(tokens)
-        )
+        last = _CLOSE if sparse else _OPEN  # behind which there can be a weight
+        end = tokens.index(last) if last in tokens else len(tokens)
         cells = self._sparse(tokens[1:end]) if sparse else tokens[:end]
         weights = [token for token, _ in tokens[end + 1 :] if token not in "{}"]
         if len(cells) != len(self._attributes):
@@ -167,7 +159,7 @@ class _Reader:
     def _sparse(self, tokens: Sequence[Token]) -> list[Token]:
         cells = [("0" if a.values is None else a.values[0], False) for a in self._attributes]
         for (index, _), cell in zip(tokens[::2], tokens[1::2], strict=False):
-            if not (index.isdecimal() and len(index) <= LONGEST_INDEX) or int(index) >= len(cells):
+            if not index.isdecimal() or len(index) > len(str(len(cells))) or int(index) >= len(cells):
                 raise self._error(f"sparse index {index[:LONGEST_SHOWN]!r}; allowed: 0..{len(cells) - 1}")
             cells[int(index)] = cell
         return cells

@@ -39,7 +39,7 @@ def confounded(labelled: Labelled) -> str:
         if says_the_label(values, labelled.labels):
             return (
                 f"all trials of a label have the same {name}: which of both is recognised cannot be told. Record each "
-                f"label with several; a feature can be left out ({option('features', python='columns')})"
+                f"label with several; a feature can be left out ({option('features', '-NAME', python='columns')})"
             )
     named = None if labelled.grouped else exchangeable_instances(labelled)
     if _in_stretches(labelled) and (named is None or _drifts(labelled, named)):

@@ -19,7 +19,7 @@ from graspsense.core.values.printable import in_one_line
 
 if TYPE_CHECKING:
     import numpy as np
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
 Target = Literal["both", "class", "state"]
 TARGETS: Final[tuple[Target, ...]] = ("both", "class", "state")
@@ -121,12 +121,11 @@ class Labelled:
                 raise ValueError(
                     f"{len(self.table)} trials and {len(column)} {name}: give one for each trial"
                 )
-        _refuse_too_large(self.table, self.source)
-        for _, control, _, _ in self.other_features():
-            if control is not None:
-                _refuse_too_large(control.table, self.source)
+        controls = [control.table for _, control, _, _ in self.other_features() if control is not None]
+        for table in (self.table, *controls):
+            _refuse_too_large(table.names, table.values, self.source)
         if self.value is not None:
-            _refuse_large_target(self.value, self.source)
+            _refuse_too_large([self.value.name], [[value] for value in self.value.values], self.source)
         labels = len(set(self.labels)) if self.value is None else 1
         too_many = CLASSES.exceeded(labels) or FEATURES.exceeded(len(self.table.names))
         if too_many:
@@ -211,27 +210,17 @@ class Labelled:
         return evolve(self, labels=tuple(label.partition(":")[2] for label in self.labels))
 
 
-def _refuse_too_large(table: FeatureTable, source: str) -> None:
+def _refuse_too_large(names: Sequence[str], rows: ArrayLike, source: str) -> None:
     """Raise DataDamaged for a number that nothing can be learned from, since its square is not finite."""
     import numpy as np
 
-    large = np.abs(table.values) > LARGEST_VALUE
-    if large.any():
-        trial, column = (int(number) for number in np.argwhere(large)[0])
+    values = np.asarray(rows)
+    for trial, column in np.argwhere(np.abs(values) > LARGEST_VALUE)[:1].tolist():
         raise DataDamaged(
-            f"{source}: feature {table.names[column]!r} of trial {trial + 1} is {table.values[trial, column]:g}: the "
-            f"largest magnitude to learn from is {LARGEST_VALUE:g}. Correct it, or leave this feature out "
-            f"({option('features', python='columns')})"
+            f"{source}: {names[column]!r} of trial {trial + 1} is {values[trial, column]:g}: the largest magnitude to "
+            f"learn from, or to predict, is {LARGEST_VALUE:g}. Correct it, or leave a feature out "
+            f"({option('features', '-NAME', python='columns')})"
         )
-
-
-def _refuse_large_target(target: TargetValue, source: str) -> None:
-    for trial, value in enumerate(target.values):
-        if abs(value) > LARGEST_VALUE:
-            raise DataDamaged(
-                f"{source}: {target.name!r} of trial {trial + 1} is {value:g}: the largest magnitude to predict is "
-                f"{LARGEST_VALUE:g}"
-            )
 
 
 def recognised(target: Target, labels: Sequence[str]) -> Target:

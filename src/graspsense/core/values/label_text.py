@@ -20,14 +20,16 @@ _JOINTS: Final = re.compile(
 """Spaces, underscores, hyphens and signs between words, beside a letter."""
 _LEADING: Final = re.compile(r"(?<![\d.])0+(?=\d)")
 _FILLERS: Final = re.compile(
-    "[\u034f\u115f\u1160\u17b4\u17b5\u180b-\u180f\u3164\ufe00-\ufe0f\uffa0\U000e0100-\U000e01ef]"
+    "[\u034f\u0640\u115f\u1160\u17b4\u17b5\u180b-\u180f\u3164\ufe00-\ufe0f\uffa0\U000e0100-\U000e01ef]"
 )
-"""Letters and marks that nothing shows."""
+"""Letters and marks that nothing shows, and the Arabic stroke that only lengthens a word."""
 _LOOK_ALIKE: Final = str.maketrans(
     "АВЕКМНОРСТУХІЈЅаеорсухіјѕһԁԛԝ" + "ΑΒΕΖΗΙΚΜΝΟΡΤΥΧαονρυικτχ" + "ıɡℓ,",
     "ABEKMHOPCTYXIJSaeopcyxijshdqw" + "ABEZHIKMNOPTYXaovpuiktx" + "igl.",
 )
 """Cyrillic, Greek and other letters, the Latin ones that they look like, and the decimal comma."""
+_ACCENTS: Final = re.compile("(?<=[a-z])[\u0300-\u036f]+")
+_QUOTES: Final = " .'`\"\u00ab\u00bb\u2018\u2019\u201a\u201c\u201d\u201e\u2039\u203a"
 _LAST_ZEROS: Final = re.compile(r"(?<!\d)(\d+\.\d*[1-9])0+(?![\d.])")
 
 
@@ -54,8 +56,8 @@ def label_text(text: str) -> str:
 
 
 def spelled_alike(texts: Iterable[str]) -> list[tuple[str, str]]:
-    """Return pairs of different labels or names that differ in case, spaces, hyphens, quotes, width or leading zeros
-    only, in the last zeros or the comma of a decimal number, or in letters of two alphabets that look the same.
+    """Return pairs of different labels or names that differ in case, accents, spaces, hyphens, quotes, width or leading
+    zeros only, in the last zeros or the comma of a decimal number, or in letters of two alphabets that look the same.
 
     >>> spelled_alike(["tin-can", "tin\u2010can"])
     [('tin-can', 'tin‐can')]
@@ -65,8 +67,9 @@ def spelled_alike(texts: Iterable[str]) -> list[tuple[str, str]]:
     by_form: dict[str, str] = {}
     pairs = []
     for text in sorted(set(texts)):
-        form = unicodedata.normalize("NFKC", text.translate(_LOOK_ALIKE)).translate(_LOOK_ALIKE).casefold()
-        form = _LEADING.sub("", _JOINTS.sub("", form.strip(" .'\"")))
+        form = unicodedata.normalize("NFKD", text.translate(_LOOK_ALIKE)).translate(_LOOK_ALIKE).casefold()
+        form = _ACCENTS.sub("", form)
+        form = _LEADING.sub("", _JOINTS.sub("", form.strip(_QUOTES)))
         form = _LAST_ZEROS.sub(r"\1", form)
         other = by_form.setdefault(form, text)
         if other != text:

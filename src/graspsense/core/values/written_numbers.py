@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 import re
+import unicodedata
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Final
 
@@ -49,16 +50,19 @@ _LONGEST_MISSING: Final = 20
 _LOGICAL: Final = {"True": "1", "False": "0"}
 
 _PLAIN_SIGNS: Final = {
-    **{zero + digit: str(digit) for zero in map(ord, "٠۰०০๐０") for digit in range(10)},
-    **dict.fromkeys(map(ord, "\u2010\u2011\u2012\u2013\u2014\u2212\u2796\ufe63\uff0d"), "-"),
-    **dict.fromkeys(map(ord, "\u00a0\u2007\u2008\u2009\u200a\u202f\u3000"), " "),
+    **dict.fromkeys(map(ord, "\u02d7\u2010\u2011\u2012\u2013\u2014\u2212\u2796\ufe63\uff0d"), "-"),
+    **dict.fromkeys([*map(ord, "\u00a0\u202f\u205f\u3000"), *range(0x2000, 0x200B)], " "),
     **dict.fromkeys(map(ord, "\u00b4\u02bc\u2018\u2019\u2032\u066c\uff07"), "'"),
     **dict.fromkeys(map(ord, "\u00b7\u066b\uff0e"), "."),
     **dict(zip(map(ord, "\uff0b\uff0c\u2248"), "+,~", strict=True)),
 }
-"""Digits of other scripts and of full width, and signs and spaces of numbers as word processors have them."""
-_ABOUT: Final = re.compile(r"~ ?(?=[-+.\d])|(?<=[\d.]) ?(?:\u00b1|\+/?-) ?[\d.,]+")
+"""Signs and spaces of numbers as word processors have them."""
+_ABOUT: Final = re.compile(r"~ ?(?=[-+.\d])|(?<=[\d.]) ?(?:(?:\u00b1|\+/?-) ?[\d.,]+|\([\d.,]+\)(?=$|[eE]))")
 """What says that a number is rounded, before it, and how uncertain it is, behind it."""
+_POWER: Final = re.compile(
+    r"(?<=[\d.]) ?[x*\u00d7\u00b7\u22c5] ?10(?:(?:\^|\*\*)([-+\u2212]?\d+)|([⁺⁻]?[⁰¹²³⁴-⁹]+))$"
+)
+"""`x 10^-3` behind a number."""
 
 
 def _form(mark: str, *whole: str) -> re.Pattern[str]:
@@ -112,8 +116,7 @@ def is_missing(cell: str) -> bool:
 
 def is_number(cell: str) -> bool:
     """Return whether a text is a number in any notation."""
-    text = plain_text(cell)
-    return any(form.fullmatch(text) for form in _FORMS.values())
+    return _notations(plain_text(cell)) > 0
 
 
 def plain_text(cell: str) -> str:
@@ -121,13 +124,21 @@ def plain_text(cell: str) -> str:
 
     Nor does it have the apostrophe of a spreadsheet or quotes around it.
 
-    >>> [*map(plain_text, ("\u22121\u2019000", "'-0.5", "12\u202f000", "~\uff11.5 \u00b1 0.2"))]
-    ["-1'000", '-0.5', '12 000', '1.5']
+    >>> [*map(plain_text, ("\u22121\u2019000", "'-0.5", "12\u202f000", "~\uff11.5 \u00b1 0.2", "1.5 (2)"))]
+    ["-1'000", '-0.5', '12 000', '1.5', '1.5']
+    >>> [*map(plain_text, ("1.5\u00d710\u207b\u00b3", "0.5-"))]  # the second as SAP writes -0.5
+    ['1.5e-3', '(0.5)']
     """
+    if "10" in cell:
+        cell = _POWER.sub(lambda match: f"e{unicodedata.normalize('NFKC', match[1] or match[2])}", cell)
     if not cell.isascii():
         cell = cell.translate(_PLAIN_SIGNS).strip()
-    if "~" in cell or "\u00b1" in cell or "+" in cell:
+    if not cell.isascii():  # digits of other scripts
+        cell = "".join(str(unicodedata.decimal(sign, sign)) for sign in cell)
+    if "~" in cell or "\u00b1" in cell or "+" in cell or "(" in cell:
         cell = _ABOUT.sub("", cell)
+    if cell.endswith("-") and cell[0].isdigit():
+        cell = f"({cell[:-1]})"
     return cell.strip("'") if cell.startswith("'") else cell
 
 
@@ -233,7 +244,7 @@ def _common(cells: Sequence[str]) -> int | NotNumbers:
     bracketed = [cell.startswith("(") for cell in cells if not is_missing(cell)]
     if bracketed and all(bracketed):
         return NotNumbers(
-            0, cells[0], "and all cells stand in parentheses: leave these out, or write a minus sign"
+            0, cells[0], "and all cells have parentheses or a minus sign last: write the minus sign first"
         )
     return common or _mixed(cells)
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import re
+import unicodedata
 from collections.abc import Iterable, Sequence
 from copy import copy
 from pathlib import Path
@@ -67,7 +68,7 @@ class CsvColumns:
         self.units: dict[str, str] = {}
         self.names: list[str] = []
         self.cells: dict[str, list[str]] = {}
-        headings = [name_and_unit(text_of_cell(heading)) for heading in table.names]
+        headings = [name_and_unit(unicodedata.normalize("NFC", text_of_cell(name))) for name in table.names]
         called = distinct_names([name for name, _ in headings])
         renamed: list[str] = []
         for name, (given, unit), unit_of_line, column in zip(
@@ -103,6 +104,7 @@ class CsvColumns:
             raise ConfigError(
                 f"{self.path} has no column {name!r} ({what}). Its columns: {listed(self.names)}."
                 + suggestion(name, self.names)
+                + "".join(f" Note: {note}." for note in self.notes)
             )
         return self.cells[name]
 
@@ -117,11 +119,8 @@ class CsvColumns:
     def numbers(self, name: str) -> list[float]:
         """Return a column as numbers, NaN where missing. Raises DataDamaged with the line that has another text."""
         self.column(name, "a feature")
-        number = self._read_numbers()[name]
+        number = self.numbers_or_times(name)
         if isinstance(number, NotNumbers):
-            times = seconds_since_first(self.cells[name])
-            if times is not None:
-                return [float(value) for value in times]
             raise DataDamaged(f"{self.path}, line {self.lines[number.row]}: {name} is {number.words}")
         infinite = np.flatnonzero(np.isinf(number))
         if len(infinite):
@@ -160,6 +159,12 @@ class CsvColumns:
         """Return the numbers of a column, NaN where missing and also infinite; None if a cell is another text."""
         numbers = self._read_numbers()[name]
         return None if isinstance(numbers, NotNumbers) else numbers
+
+    def numbers_or_times(self, name: str) -> Numbers | NotNumbers:
+        """Return the numbers of a column, or its times in seconds since the first one, or why it has neither."""
+        numbers = self._read_numbers()[name]
+        times = seconds_since_first(self.cells[name]) if isinstance(numbers, NotNumbers) else None
+        return numbers if times is None else times
 
     def has_numbers(self, name: str) -> bool:
         """Return whether half of the cells of a column are numbers: a few may be so by chance, as those of hashes."""

@@ -1,8 +1,8 @@
 """Text files as tables: where the table begins, what separates its columns, how they are called, and its cells.
 
-A table may be preceded by lines about the instrument, by `sep=;`, or by comments (`#`, `%`), and its names may be
-followed by a line with units. Its names can stand in a comment, as `numpy.savetxt` writes them. A file with one JSON
-object a line is a table too. Whatever is left out is told in a note.
+A table may be preceded by lines about the instrument, by `sep=;`, or by comments (`#`, `%`, `//`, `!`), and its names
+may be followed by a line with units. Its names can stand in a comment, as `numpy.savetxt` writes them. A file with one
+JSON object a line is a table too. Whatever is left out is told in a note.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ _UNSEEN: Final = re.compile("[\u200b\u200e\u200f\u202a-\u202e\u2060\u2066-\u2069
 """Marks that nothing shows: the order of bytes, also in the middle of files that were joined, and of writing."""
 _SEPARATORS: Final = (";", "\t", ",", "|", " ", "  ")
 """The last ones stand for any number of spaces, and for two or more, where names have spaces."""
-_COMMENTS: Final = ("#", "%")
+_COMMENTS: Final = ("#", "%", "//", "!")
 _RULE: Final = re.compile(r"(?=.*[-_=]{3})[-_=+|:\s]+")
 """A line of signs below the names, or around a table."""
 _REMARKS: Final = frozenset({"comment", "comments", "remark", "remarks", "note", "notes"})
@@ -236,7 +236,7 @@ class _Layout:
             named = self._names_in_comment(width)
             if named is not None:
                 return named[1], named[2], 0, named[0]
-            if all(is_number(cell) or is_missing(cell) for cell in top):
+            if _are_numbers(top):
                 ordinals = [*map(str, range(width))]
                 if numbered := width > 2 and top in (ordinals, ["", *ordinals[:-1]]):
                     self._tell([self.rows[0][0]], "lines that number the columns")
@@ -275,10 +275,9 @@ class _Layout:
         """Return the same where `data` rows come before the numbers. Raises DataDamaged if none of them has names."""
         if joined := self._joined_names(data, width):
             return joined
-        texts = [
-            set() if k in numeric else {row[k] for _, row in self.rows[data:] if k < len(row)}
-            for k in range(width)
-        ]
+        head = [row for _, row in self.rows[:data]]
+        below = [row for _, row in self.rows[data:] if row not in head]
+        texts = [set() if k in numeric else {row[k] for row in below if k < len(row)} for k in range(width)]
         able = [k for k in range(data) if _can_be_names(self.rows[k][1], width, texts)]
         if not able:
             number, row = self.rows[data]
@@ -347,11 +346,7 @@ class _Layout:
 
     def _refuse_numbers_before(self, names: int) -> None:
         """Raise DataDamaged if rows of numbers that may be a part of the data come before the row `names`."""
-        numbers = [
-            number
-            for number, row in self.rows[:names]
-            if len(row) > 1 and all(is_number(cell) or is_missing(cell) for cell in row)
-        ]
+        numbers = [number for number, row in self.rows[:names] if len(row) > 1 and _are_numbers(row)]
         if len(numbers) > max(_FEW_BEFORE, _MOST_BEFORE * (len(self.rows) - names)):
             raise DataDamaged(
                 f"{self.path}: line {self.rows[names][0]} names the columns of the lines after it, and {len(numbers)} "
@@ -378,7 +373,7 @@ class _Layout:
 
     def _cells(self, comment: str, width: int) -> list[str]:
         """Return the names in a text, which may separate so many words by another sign than the rows do."""
-        text = comment.strip().lstrip("#% ")
+        text = comment.strip().lstrip("#%/! ")
         for separator in _SEPARATORS[:-2]:
             cells = [cell.strip() for cell in text.split(separator)]
             if len(cells) == width and (
@@ -395,7 +390,8 @@ class _Layout:
         self, rows: list[Row], names: Sequence[str], units: Sequence[str] | None
     ) -> list[Row]:
         """Return the rows that are not the header again."""
-        again = {number for number, row in rows if row == [*names]}
+        folded = [name.casefold() for name in names]
+        again = {number for number, row in rows if [cell.casefold() for cell in row] == folded}
         if not again or all(map(is_number, names)):
             return rows
         self._tell(again, "repeated headers")
@@ -555,8 +551,9 @@ def _separator(lines: Sequence[str]) -> str:
     """
     widths = {separator: _width(lines, separator) for separator in _SEPARATORS}
     agreeing = {separator: count for separator, (width, count) in widths.items() if width > 1}
-    if agreeing.get(" ", 0) >= agreeing.get(",", 1) and _commas_are_within_numbers(lines):
-        agreeing.pop(",", None)
+    spaces_agree = agreeing.get(" ", 0) >= agreeing.get(",", 1)
+    if spaces_agree and 2 * sum(map(_are_numbers, map(str.split, lines))) >= len(lines):
+        agreeing.pop(",", None)  # it is within numbers, as in `1,5 2,5`
     able = [separator for separator, count in agreeing.items() if count >= 0.9 * max(agreeing.values())]
     fitting = [item for item in able if _width(lines[:1], item)[0] == widths[item][0]]
     return next(iter(fitting or able), "\x1f")
@@ -571,10 +568,9 @@ def _words(line: str, separator: str) -> list[str]:
     return [quoted or word for quoted, word in re.findall(r'"([^"]*)"(?!\S)|(\S+)', line)]
 
 
-def _commas_are_within_numbers(lines: Sequence[str]) -> bool:
-    """Return whether spaces separate numbers with commas, as in `1,5 2,5`, in most lines."""
-    numbers = sum(all(is_number(word) or is_missing(word) for word in line.split()) for line in lines)
-    return 2 * numbers >= len(lines)
+def _are_numbers(cells: Sequence[str]) -> bool:
+    """Return whether every cell is a number or missing."""
+    return all(is_number(cell) or is_missing(cell) for cell in cells)
 
 
 def _width(lines: Sequence[str], separator: str) -> tuple[int, int]:

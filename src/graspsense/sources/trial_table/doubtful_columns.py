@@ -12,14 +12,13 @@ from collections.abc import Hashable, Iterator, Mapping, Sequence
 from decimal import Decimal
 from itertools import groupby
 from operator import itemgetter
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from graspsense.core.components.caller import option
 from graspsense.core.learn.confounding import LEAST_LINES, says_the_label
 from graspsense.core.values.errors import counted, listed
-from graspsense.core.values.features import LARGEST_VALUE
 from graspsense.sources.columns.column_guess import words_of
 from graspsense.sources.trial_table.identifiers import (
     TIMES,
@@ -27,10 +26,11 @@ from graspsense.sources.trial_table.identifiers import (
     can_be_days,
     follow_lines,
     groups_of_labels,
-    groups_trials,
     is_count,
     is_time,
     name_objects,
+    names_only,
+    one_way,
 )
 
 if TYPE_CHECKING:
@@ -48,6 +48,12 @@ _OF_TIMES: Final = TIMES | {
 _OF_A_SESSION: Final = frozenset({
     "temperature", "temp", "humidity", "battery", "batt", "vbat", "baseline", "zero", "initial", "start", "before"
 })  # fmt: skip
+_RESULTS: Final = frozenset({
+    "svm", "knn", "nn", "mlp", "cnn", "rf", "lda", "classifier", "model", "output", "out", "margin", "loss", "residual",
+    "decision", "result", "outcome", "votes", "pvalue", "pval",
+})  # fmt: skip
+_OF_RESULTS: Final = frozenset({"value", "val", "distance", "dist", "function", "rank"})
+"""What a model or a test says, by the name of a column."""
 _TEMPERATURES: Final = frozenset({"C", "\u00b0C", "degC"})
 """What can be the same, or drift, in a whole session; by the name of a column, or by its unit."""
 _OFTEN: Final = 3
@@ -64,6 +70,8 @@ _ROUNDED: Final = 6
 """Most digits of a number that is taken for a rounded one."""
 _MOSTLY: Final = 0.75
 """Share of the lines of each label from which on a value may be the setting that this label was recorded with."""
+_NEAR: Final = 0.3
+"""Largest distance of a number from the whole one that it is rounded to."""
 _ROUNDED_SUM: Final = 0.02
 """Largest error of a sum of probabilities."""
 _ENOUGH_LINES: Final = 30
@@ -77,64 +85,39 @@ _ALIKE: Final = 1.0 / 3.0
 """Ratios of a pad to the other one below which they are far apart, and above which they are alike."""
 _PROPORTIONAL: Final = 1.0 - 1e-6
 """Correlation with the number to predict from which on a column is that number in another unit."""
-_RECORDED: Final = "If it tells when a trial was recorded, it reveals the labels: "
-_DOUBTS: Final[Mapping[str, tuple[str, str]]] = {
-    "same": (
-        "all trials of a label have the same value",
-        "If it is the label in other words, or tells of the recording, ",
-    ),
-    "mostly": (
-        "most trials of each label have the same one of its few values",
-        "If it is a setting of the experiment, or a prediction, it reveals the labels: ",
-    ),
-    "probabilities": (
-        "these are between 0 and 1, their sum is 1, and most trials of each label have the largest one in one of them",
-        "If a model said so, it reveals the labels: ",
-    ),
-    "one label": (
-        "each of its values occurs with one label only, or with labels that no other shares",
-        "If it names sessions, devices or objects, or was measured once for each, it reveals the labels: ",
-    ),
-    "blocks": (
-        "each of its values is that of consecutive lines, as a month, a session or a version is",
-        "If it tells when or how a trial was recorded, it reveals the labels: ",
-    ),
-    "missing": (
-        "some labels have nearly all of its values, and others hardly any",
-        "If the recording is the reason, and not the object, it reveals the labels: ",
-    ),
-    "order": (
-        "its values follow the order of recording within each label, as a drifting zero, a battery or a clock does",
-        _RECORDED,
-    ),
-    "time": (
-        "its name is that of a time, or its values can be dates as spreadsheets and MATLAB number them",
-        "If it is the time of recording, it reveals the labels: ",
-    ),
-    "session": (
-        "it is from before the contact, or can drift in a session, by its name or unit",
-        _RECORDED,
-    ),
-    "without a gap": (
-        "its values pass from label to label without a gap or an overlap, as those of a clock or a counter do",
-        "If it is a time or a counter it reveals the labels: ",
-    ),
-    "digits": (
-        "it is written with fewer digits for some labels than for others",
-        "Digits tell the labels: round all values alike, or ",
-    ),
-    "rising": (
-        "every line has more than the one before, or every line less",
-        "If it is a time or a counter, ",
-    ),
-    "target": (
-        "the number to predict determines it, as in another unit or for a known object",
-        "If it is not measured apart from it, ",
-    ),
+_DOUBTS: Final[Mapping[str, Mapping[str, str]]] = {
+    "If it is the label or a prediction in other words, or a setting of the experiment, it reveals the labels: ": {
+        "same": "all trials of a label have the same value",
+        "mostly": "most trials of each label have the same one of its few values",
+        "probabilities": "these are between 0 and 1, their sum is 1, and most trials of each label have the largest "
+        "one in one of them",
+        "result": "its name is that of the result of a model or a test, or has a label in it",
+    },
+    "If it tells when, how or with which object a trial was recorded, it reveals the labels: ": {
+        "one label": "each of its values occurs with one label only, or with labels that no other shares",
+        "blocks": "each of its values is that of consecutive lines, as a month, a session or a version is",
+        "missing": "some labels have nearly all of its values, and others hardly any",
+        "order": "its values follow the order of recording within each label, as a drifting zero, a battery or a clock "
+        "does",
+        "session": "it is from before the contact, or can drift in a session, by its name or unit",
+        "without a gap": "its values pass from label to label without a gap or an overlap, as those of a clock or a "
+        "counter do",
+    },
+    "If it is the time of recording, it reveals the labels: name it as the order, or ": {
+        "time": "its name is that of a time, or its values can be dates as spreadsheets and MATLAB number them",
+    },
+    "Digits tell the labels: round all values alike, or ": {
+        "digits": "it is written with fewer digits for some labels than for others",
+    },
+    "If it is a time or a counter, or is not measured apart from that number, ": {
+        "rising": "every line has more than the one before, or every line less",
+        "target": "the number to predict determines it, as in another unit or for a known object",
+    },
 }
-"""Why a column may reveal the labels, or the number to predict: what shows it, and what to do about it."""
+"""What to do about a column that may reveal the labels, or the number to predict, by what shows it."""
 
 
+@np.errstate(over="ignore", invalid="ignore")  # of numbers that no sensor gives
 def doubts(
     columns: CsvColumns,
     labels: Sequence[str],
@@ -146,68 +129,60 @@ def doubts(
 
     `lines` are those to be looked at, in the order of recording.
     """
-    columns, table, labels = columns.rows(lines), table.rows(np.array(lines)), [labels[i] for i in lines]
+    columns, labels = columns.rows(lines), [labels[i] for i in lines]
     used = [name for name in columns.names if set(columns.columns_of(name)) <= set(table.names)]
-    numbers = _numbers(columns, [name for name in used if not columns.is_nominal(name)])
+    numbers = {name: np.array(columns.numbers(name)) for name in used if not columns.is_nominal(name)}
     doubted: dict[str, list[str]] = {}
     for name in used if target is None else numbers:
         if target is not None:
             reasons = [*_of_target(numbers[name], np.array(target.values)[lines])]
         else:
-            missing = np.isnan(table.columns(columns.columns_of(name)[:1]).values[:, 0]).tolist()
             reasons = [*_of_recording(columns, name, labels)]
-            reasons += ["missing"] if says_of_labels(missing, labels) else []
-            reasons += (
-                _of_numbers(name, columns.units[name], numbers[name], labels) if name in numbers else []
-            )
+            if name in numbers:
+                reasons += _of_numbers(name, columns.units[name], numbers[name], labels)
         for reason in reasons:
             doubted.setdefault(reason, []).append(name)
     if target is None:
         doubted["probabilities"] = [*_probabilities(numbers, labels)]
-    leave_out = f"leave it out ({option('features', python='columns')})"
+    out = option("features", "-NAME", python="columns")
     notes = [
-        f"used, although {what}: {listed(doubted[reason])}. {advice}{leave_out}"
-        for reason, (what, advice) in _DOUBTS.items()
+        f"used, although {what}: {listed(doubted[reason])}. {advice}leave it out ({out})"
+        for advice, shown in _DOUBTS.items()
+        for reason, what in shown.items()
         if doubted.get(reason)
     ]
     return notes + _mixed(numbers) + list(_pads_apart(numbers))
 
 
-def not_held_out(columns: CsvColumns, names: Sequence[str], instances: Sequence[str] | None) -> list[str]:
-    """Return notes on those of these columns whose sessions, operators or devices are in training and test data."""
-    return [
-        f"not held out: trials of one {name} are in training and test data. If it matters, a further {name} is "
-        f"recognised less often than told; {option('instance', name)} holds it out"
-        for name in names
-        if groups_trials(name, columns.texts(name), instances)
-    ]
-
-
 def _of_recording(columns: CsvColumns, name: str, labels: Sequence[str]) -> Iterator[str]:
     """Yield why the texts of a column may tell of labels, devices or objects."""
-    cells, is_number = columns.cells[name], is_count(columns.units[name])
-    if says_the_label(cells, labels):
+    cells, nominal, is_number = columns.cells[name], columns.is_nominal(name), is_count(columns.units[name])
+    values = columns.texts(name) if nominal else columns.numbers(name)
+    if says_the_label(cells, labels) or (not nominal and is_number and is_code(values, labels)):
         yield "same"
         return
     if mostly_says_the_label(cells, labels):
         yield "mostly"
-    values = cells if columns.is_nominal(name) else columns.numbers(name)
+    if mostly_says_the_label([value == "" or value != value for value in values], labels, 1.0 - _FEW):
+        yield "missing"
     if name_objects(cells, labels) or (is_number and values_have_one_label(values, labels)):
         yield "one label"
-    if (columns.is_nominal(name) or is_number) and in_one_block_each(cells, labels):
+    if (nominal or is_number) and in_one_block_each(cells, labels):
         yield "blocks"
 
 
 def _of_numbers(name: str, unit: str, values: Numbers, labels: Sequence[str]) -> Iterator[str]:
     """Yield why the numbers of a column may tell of the time of recording, or of how they were written."""
     of_time, differs = is_count(unit) or is_time(unit), differs_by_label(values, labels)
-    if (differs or are_in_blocks(labels)) and follow_lines(values, labels):
+    # Where the lines of a label mostly come one after the other, what drifts can tell labels.
+    in_blocks = LEAST_LINES * sum(1 for _ in groupby(labels)) <= len(labels)
+    if (differs or in_blocks) and follow_lines(values, labels):
         yield "order"
-    words = set(words_of(name))
-    named_as_time = _TIME_NAMES & words and words <= _TIME_NAMES | _OF_TIMES
-    if of_time and (named_as_time or can_be_days(values)):
+    if of_time and (names_only(name, _TIME_NAMES, _OF_TIMES) or can_be_days(values)):
         yield "time"
-    if differs and (_OF_A_SESSION & words or unit in _TEMPERATURES):
+    if is_count(unit) and is_result(name, labels if differs else ()):
+        yield "result"
+    if differs and (_OF_A_SESSION & set(words_of(name)) or unit in _TEMPERATURES):
         yield "session"
     if of_time and passes_without_a_gap(values, labels):
         yield "without a gap"
@@ -221,52 +196,46 @@ def _probabilities(numbers: dict[str, Numbers], labels: Sequence[str]) -> Iterat
     for begin in range(len(names) - n + 1):
         group = names[begin : begin + n]
         values = np.array([numbers[name] for name in group])
-        sums = values.sum(axis=0)
-        shares = n > 1 and (values >= 0.0).all() and (np.abs(sums - 1.0) <= _ROUNDED_SUM).all()
+        shares = n > 1 and (values >= 0.0).all() and (np.abs(values.sum(axis=0) - 1.0) <= _ROUNDED_SUM).all()
         if shares and mostly_says_the_label(values.argmax(axis=0).tolist(), labels):
             yield from group
 
 
 def _of_target(values: Numbers, target: Numbers) -> Iterator[str]:
     """Yield why the numbers of a column may be the number to predict itself, or when it was measured."""
-    if keeps_rising(values):
+    if len(values) > 2 * LEAST_LINES and one_way(values) == 1.0:
         yield "rising"
     if follows_from(values, target):
         yield "target"
 
 
-def keeps_rising(values: Sequence[float] | Numbers) -> bool:
-    """Return whether each value is larger than the one before, or each is smaller, in lines that are not few."""
-    steps = np.diff(np.array(values, dtype=np.float64))
-    return len(steps) >= 2 * LEAST_LINES and bool((steps > 0.0).all() or (steps < 0.0).all())
+def mostly_says_the_label(values: Sequence[Hashable], labels: Sequence[str], share: float = _MOSTLY) -> bool:
+    """Return whether each label, of lines that are not few, has one of few values in this share of its lines.
 
-
-def mostly_says_the_label(values: Sequence[Hashable], labels: Sequence[str]) -> bool:
-    """Return whether each label, of lines that are not few, has one of few values in most of its lines.
-
-    There are no more values than labels, as where each was recorded by another operator or at another level of force.
+    Few lines have another value, as where each label was recorded by its operator or at its level of force.
     """
     counts = Counter(labels)
-    usual: dict[str, Hashable] = {}
-    for (value, label), lines in Counter(zip(values, labels, strict=True)).items():
-        if lines >= _MOSTLY * counts[label]:
-            usual[label] = value
-    few = len(set(values)) <= len(counts) and min(counts.values()) >= LEAST_LINES
-    return few and len(usual) == len(counts) and len(set(usual.values())) == len(set(values)) > 1
+    pairs = Counter(zip(values, labels, strict=True))
+    usual = {label: value for (value, label), n in pairs.items() if n >= share * counts[label]}
+    others = sum(n for (value, _), n in pairs.items() if value not in usual.values())
+    few = others <= _FEW * len(labels) and min(counts.values()) >= LEAST_LINES
+    return few and len(usual) == len(counts) and len(set(usual.values())) > 1
 
 
-def are_in_blocks(labels: Sequence[str]) -> bool:
-    """Return whether the lines of a label mostly come one after the other, so that what drifts can tell labels."""
-    return LEAST_LINES * sum(1 for _ in groupby(labels)) <= len(labels)
+def is_code(values: Sequence[Any], labels: Sequence[str]) -> bool:
+    """Return whether the values of each label are near to a whole number of its own, and these follow each other."""
+    codes = np.round(values)
+    near = bool((np.abs(codes - values) <= _NEAR).all())
+    return near and np.ptp(codes) == len(set(labels)) - 1 and says_the_label(codes.tolist(), labels)
 
 
-def says_of_labels(values: Sequence[bool], labels: Sequence[str]) -> bool:
-    """Return whether nearly all lines of some labels have one of two values, and nearly all of the others the other."""
-    counts = Counter(labels)
-    having = Counter(label for value, label in zip(values, labels, strict=True) if value)
-    shares = [having[label] / count for label, count in counts.items()]
-    telling = all(min(share, 1.0 - share) <= _FEW for share in shares)
-    return telling and min(shares) < 0.5 < max(shares) and min(counts.values()) >= LEAST_LINES
+def is_result(name: str, labels: Sequence[str]) -> bool:
+    """Return whether a heading is that of the result of a model or a test, or has a label in it, as `score_can`."""
+    words = words_of(name)
+    parts = [words_of(label) for label in set(labels)]
+    # One or two letters of a label are in a heading by chance.
+    of_label = any(len("".join(part)) > 2 and {*part} <= {*words} for part in parts)
+    return of_label or "".join(words) in _RESULTS or names_only(name, _RESULTS, _OF_RESULTS)
 
 
 def digits_tell_labels(values: Numbers, labels: Sequence[str]) -> bool:
@@ -374,13 +343,6 @@ def follows_from(values: Numbers, target: Numbers) -> bool:
     return pairs == of_target and bool(rises) and len(set(values.tolist())) >= LEAST_LINES
 
 
-def _numbers(columns: CsvColumns, names: Sequence[str]) -> dict[str, Numbers]:
-    """Return these columns of numbers, without those that are too large to learn from."""
-    numbers = {name: np.array(columns.numbers(name)) for name in names}
-    return {name: values for name, values in numbers.items() if not (np.abs(values) > LARGEST_VALUE).any()}
-
-
-@np.errstate(over="ignore")  # of differences and ratios of numbers that no sensor gives
 def _mixed(numbers: dict[str, Numbers]) -> list[str]:
     """Return notes on columns in which a number stands for something else, or whose unit changes."""
     notes = []
@@ -428,20 +390,16 @@ def stand_in_of(known: Numbers) -> float | None:
     if times < _OFTEN:
         value = float(known[np.abs(known - np.median(known)).argmax()])
     others = known[known != value]
-    if len(np.unique(others)) < LEAST_LINES:
+    repeats = np.unique(others, return_counts=True)[1]
+    if len(repeats) < LEAST_LINES:
         return None
     span = float(others.max() - others.min()) * (1.0 if times >= _OFTEN else _LONE)
     far = value < others.min() - span or value > others.max() + span
     apart = value != 0.0 or float(np.abs(others).min()) > _FROM_ZERO * float(np.ptp(others))
     often = times >= (LEAST_LINES if value else _OFTEN)
-    stuck = often and apart and _mostly_different(others)
+    different = int(repeats.max()) <= 2 and len(repeats) > (1.0 - _FEW) * len(others)
+    stuck = often and apart and different
     return float(value) if far or stuck else None
-
-
-def _mostly_different(values: Numbers) -> bool:
-    """Return whether no value is that of more than two lines, and few are those of two."""
-    counts = np.unique(values, return_counts=True)[1]
-    return len(values) >= LEAST_LINES and int(counts.max()) <= 2 and len(counts) > (1.0 - _FEW) * len(values)
 
 
 def unit_changes(known: Numbers) -> bool:

@@ -58,14 +58,11 @@ class ExportedTable:
     def order(self) -> tuple[tuple[int, ...] | None, str]:
         """Return the position of each trial in the order of recording, or None with the reason."""
         cells = self.columns.cells
-        if "recorded_at" not in self.about:
-            labels = ["{}"] * len(self.columns)
-        else:
-            keys = ("recorded_at", "order")
-            labels = [
-                json.dumps({key: cells[key][i] for key in keys if not is_missing_label(cells[key][i])})
-                for i in range(len(self.columns))
-            ]
+        keys = [key for key in ("recorded_at", "order") if key in self.about]
+        labels = [
+            json.dumps({key: cells[key][i] for key in keys if not is_missing_label(cells[key][i])})
+            for i in range(len(self.columns))
+        ]
         return order_recorded(cells["made_at"], cells["origin"], labels)
 
     def before_contact(self) -> FeatureTable | None:

@@ -6,6 +6,7 @@ describe a trial are never features, and every feature remains one even if no tr
 
 from __future__ import annotations
 
+import fnmatch
 import math
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -25,11 +26,11 @@ from graspsense.core.values.errors import ConfigError, DataDamaged, listed
 from graspsense.core.values.features import UNKNOWN, FeatureTable
 from graspsense.core.values.label_text import is_missing_label, label_text
 from graspsense.core.values.nominal import splits_of
-from graspsense.core.values.written_numbers import is_missing
+from graspsense.core.values.written_numbers import NotNumbers, is_missing
 from graspsense.recording.controls import Controls, controls
 from graspsense.sources.formats.arff_columns import ArffColumns
 from graspsense.sources.formats.csv_columns import CsvColumns
-from graspsense.sources.trial_table.doubtful_columns import doubts, not_held_out
+from graspsense.sources.trial_table.doubtful_columns import doubts
 from graspsense.sources.trial_table.exported_table import ExportedTable, exported
 from graspsense.sources.trial_table.identifiers import (
     OF_OBJECTS,
@@ -72,9 +73,10 @@ def read_labelled(
     `instance` is the column that identifies the individual object (default: the column `instance`, or the only one
     whose values name objects), `order` a column of numbers that increase in the order of recording (default: the order
     of the lines). Both are known in a table that `graspsense export` wrote.
-    `features` are the columns to learn from, by default all columns of numbers that have no other meaning. Those of
-    `known_before` are known before contact, for the control; they are features unless `features` leaves them out. With
-    `value`, this column of numbers is the target; lines without it are left out, and no label is needed.
+    `features` are the columns to learn from, by default all that have no other meaning; `pad_*` is all that begin so,
+    and `-NAME` leaves one out. Those of `known_before` are known before contact, for the control; they are features
+    unless `features` leaves them out. With `value`, this column of numbers is the target; lines without it are left
+    out, and no label is needed.
 
     Raises ConfigError if a column does not exist or cannot be a label, DataDamaged if the file is not a valid table.
     """
@@ -82,12 +84,11 @@ def read_labelled(
     notes = list(columns.notes)
     if export is not None:
         export.keep_complete_trials(label if value is None else None, notes)
-        features = features or export.features
     elif isinstance(columns, ArffColumns) and value is None:
         notes += columns.without_label(label or "")
     target = None if value is None else _target(columns, value, export, notes)
     labels = _labels(columns, label, notes, required=target is None)
-    ranks, no_order = export.order() if export and order is None else (_ranks(columns, order, notes), "")
+    ranks, no_order = export.order() if export and order is None else (_ranks(columns, order), "")
     # No feature of an exported store identifies trials: a feature set made it.
     lines = _lines_once(columns, {order, columns.index}, labels)
     identified = (lambda _: "") if export is not None else _identifying(columns, labels, ranks, lines)
@@ -95,12 +96,18 @@ def read_labelled(
         instance = _object_column(columns, {label, order, columns.index, *features}, identified, notes)
     instances = None if instance is None else tuple(columns.complete_column(instance, "the instance"))
     reserved = {name for name in (label, instance, order, value) if name}
-    table = _feature_table(columns, features, reserved, identified, notes)
+    if export is None and order is None:
+        notes.append(_no_order(columns, reserved, identified))
+    table = _feature_table(columns, features, export.features if export else [], reserved, identified, notes)
     others = [name for name in columns.names if name not in {*reserved, *table.names}]
     if export is None:
         recorded = lines if ranks is None else sorted(lines, key=ranks.__getitem__)
         notes += doubts(columns, labels, table, target, recorded)
-        notes += not_held_out(columns, others, instances)
+        notes += [
+            f"not held out: trials of one {name} are in training and test data. If it matters, a further {name} is "
+            f"recognised less often than told; {option('instance', name)} holds it out"
+            for name in _sessions(columns, others, instances)
+        ]
     return Labelled(
         source=str(path),
         table=table,
@@ -129,10 +136,12 @@ def _opened(
     return columns, export, label
 
 
-def _sessions(columns: CsvColumns, names: Sequence[str]) -> dict[str, tuple[str, ...]]:
-    """Return the texts of those of these columns that name sessions, operators or devices."""
+def _sessions(
+    columns: CsvColumns, names: Sequence[str], instances: Sequence[str] | None = None
+) -> dict[str, tuple[str, ...]]:
+    """Return the texts of those columns that name sessions, operators or devices, which no instances hold out."""
     texts = {name: tuple(columns.texts(name)) for name in names}
-    return {name: values for name, values in texts.items() if groups_trials(name, values)}
+    return {name: values for name, values in texts.items() if groups_trials(name, values, instances)}
 
 
 def _object_column(
@@ -285,10 +294,24 @@ def _labels(columns: CsvColumns, label: str | None, notes: list[str], *, require
     return labels
 
 
-def _ranks(columns: CsvColumns, order: str | None, notes: list[str]) -> tuple[int, ...]:
+def _no_order(columns: CsvColumns, reserved: set[str], identified: Callable[[str], str]) -> str:
+    """Return a note that no column was named for the order, with those that have another one than the lines."""
+    able = [
+        name
+        for name in columns.names
+        if name not in reserved
+        and not isinstance(times := columns.numbers_or_times(name), NotNumbers)
+        and len(set(times[np.isfinite(times)].tolist())) == len(times)
+        and (np.diff(times) < 0.0).any()
+        and identified(name)
+    ]
+    named = f". If it is that of {listed(able)}, name it ({option('order', 'COLUMN')})" if able else ""
+    return f"no column names the order of recording: the order of the lines is used{named}"
+
+
+def _ranks(columns: CsvColumns, order: str | None) -> tuple[int, ...]:
     """Return the position of each trial in the order of recording. Raises DataDamaged."""
     if order is None:
-        notes.append("no column names the order of recording: the order of the lines is used")
         return tuple(range(len(columns)))
     values = columns.numbers(order)
     if any(math.isnan(value) for value in values):
@@ -307,22 +330,38 @@ def _loses_digits(cells: Sequence[str], values: Sequence[float]) -> bool:
 def _feature_table(
     columns: CsvColumns,
     features: Sequence[str],
+    usual: Sequence[str],
     reserved: set[str],
     identified: Callable[[str], str],
     notes: list[str],
 ) -> FeatureTable:
-    """Return the columns named in `features`, by default all that can be one. Raises ConfigError, DataDamaged."""
-    names = list(features) or _feature_names(columns, reserved, identified, notes)
+    """Return the columns of `features`, or the usual ones, or all that can be one. Raises ConfigError, DataDamaged."""
+    able = [name for name in columns.names if name not in reserved]
+    minus = [name for name in features if name.startswith("-") and name not in columns.cells]
+    left_out = _with_patterns([name[1:] for name in minus], able)
+    for name in left_out:
+        columns.column(name, "left out of the features")
+    named = _with_patterns([name for name in features if name not in minus], able) or usual
+    named = named or _feature_names(columns, {*reserved, *left_out}, identified, notes)
+    names = [name for name in named if name not in left_out]
+    if not names:
+        raise ConfigError(f"{columns.path}: no feature remains without {listed(left_out)}")
     for name in names:
         if name in reserved:
             raise ConfigError(f"{name!r} cannot be a feature: it is the label, the instance or the order")
     table = columns.table([column for name in names for column in columns.columns_of(name)])
-    for name in features:
+    for name in names:
         if name in columns.cells and (why := identified(name)):
             notes.append(f"{name} is used, although its values {why}: it may reveal the labels")
     notes += columns.unknown_values(table.names)
     _note_uninformative_columns(columns.path, table, notes)
     return table
+
+
+def _with_patterns(given: Sequence[str], names: Sequence[str]) -> list[str]:
+    """Return these names, each once, with all that a pattern such as `pad_*` fits in its place."""
+    fitting = {text: [text] if text in names else fnmatch.filter(names, text) or [text] for text in given}
+    return list(dict.fromkeys(name for text in given for name in fitting[text]))
 
 
 def _feature_names(

@@ -44,7 +44,7 @@ _DIVISIONS: Final = frozenset({
     "seed", "trial", "fold", "kfold", "split", "is", "train", "training", "test", "testing", "validation",
     "holdout", "subset", "partition", "rep", "repeat", "repetition", "replicate", "attempt", "try", "take", "iteration",
     "random", "uid", "uuid", "crc", "checksum", "chk", "hash", "sha", "pred", "prediction", "predicted", "proba",
-    "probability", "confidence", "certainty", "score", "logit", "likelihood",
+    "probability", "confidence", "certainty", "score", "logit", "likelihood", "yhat", "hat", "cluster", "correct",
 })  # fmt: skip
 """What trials are told apart and divided by, and what a model said of them."""
 _OF_RECORDINGS: Final = _DIVISIONS | {
@@ -86,6 +86,8 @@ _EPOCH_S: Final = (6.3e8, 4.2e9)
 """The years 1990 to 2100 in seconds since 1970."""
 _PER_SECOND: Final = (1.0, 1e3, 1e6, 1e9)
 """The units of such times."""
+_LONGEST_S: Final = 3.2e8
+"""Ten years, in which the trials of a table were recorded."""
 NAME_OBJECTS: Final = "name the objects (say so by --instance)"
 NUMBER_OBJECTS: Final = "number the objects (name them by --instance)"
 NAME_THINGS: Final = "name the objects, which have several labels (say so by --instance)"
@@ -122,8 +124,13 @@ def names_a_recording(name: str) -> bool:
     >>> names_a_recording("session_id"), names_a_recording("trial"), names_a_recording("robot_force")
     (True, True, False)
     """
+    return names_only(name, _OF_RECORDINGS, _NUMBERED)
+
+
+def names_only(name: str, telling: frozenset[str], further: frozenset[str]) -> bool:
+    """Return whether a heading has one of these words, and besides them only further ones."""
     words = set(words_of(name))
-    return bool(words & _OF_RECORDINGS) and words <= _OF_RECORDINGS | _NUMBERED
+    return bool(words & telling) and words <= telling | further
 
 
 def groups_trials(name: str, values: Sequence[str], instances: Sequence[str] | None = None) -> bool:
@@ -163,16 +170,16 @@ def identifies(
     if (hashed or cells <= 2.0 * len(values_of)) and name_objects(column.tolist(), known):
         return NUMBER_OBJECTS
     named = bool(_NAMES & set(words_of(name)))
-    orders = (given, None if order is None else np.array(order)[given])
-    if (whole or named) and any(lines is not None and _begins_anew(column, lines) for lines in orders):
-        return "follow the order of the lines as a counter or a time does"
-    if len(set(zip(column.tolist(), known, strict=True))) >= (1.0 - _TIES) * len(column):
-        for lines in orders:
-            if lines is not None and (
-                (_follows(column, lines, known) and (whole or named or _is_regular(values_of)))
-                or (is_time(unit) and _follows_in_labels(column, lines, known))
-            ):
-                return "follow the order of the lines as a counter or a time does"
+    different = len(set(zip(column.tolist(), known, strict=True))) >= (1.0 - _TIES) * len(column)
+    for lines in [given] if order is None else [given, np.array(order)[given]]:
+        way, in_labels = one_way(column[np.argsort(lines)]), _follows_in_labels(column, lines, known)
+        # A counter of a byte begins anew.
+        counts = len(values_of) >= _COUNTING and way >= 1.0 - _TIES
+        follows = different and (way == 1.0 or in_labels)
+        like_clock = _is_regular(values_of) or (is_time(unit) and in_labels)
+        if ((whole or named) and (counts or follows)) or (follows and like_clock):
+            return "follow the order of the lines as a counter or a time does"
+    if different:
         if _hardly_repeats(len(column), len(values_of), cells) or (
             named and whole and len(values_of) == len(column)
         ):
@@ -227,7 +234,9 @@ def _is_calendar(column: NDArray[np.float64]) -> bool:
     low, high = _EPOCH_S
     # No two grasps are recorded within a second.
     if distinct > len(column) / 2 and any(
-        low * unit <= least and most <= high * unit and most - least >= (distinct - 1) * unit
+        low * unit <= least
+        and most <= high * unit
+        and (distinct - 1) * unit <= most - least <= _LONGEST_S * unit
         for unit in _PER_SECOND
     ):
         return True
@@ -258,18 +267,10 @@ def can_be_days(values: NDArray[np.float64]) -> bool:
     return any(low <= known.min() and known.max() <= high for low, high in _DAYS)
 
 
-def _follows(column: NDArray[np.float64], lines: NDArray[np.int64], labels: Sequence[str]) -> bool:
-    """Return whether the values rise, or fall, with these positions within each label, or over all of them."""
-    steps = np.diff(column[np.argsort(lines)])
-    return bool((steps > 0.0).all() or (steps < 0.0).all()) or _follows_in_labels(column, lines, labels)
-
-
-def _begins_anew(column: NDArray[np.float64], lines: NDArray[np.int64]) -> bool:
-    """Return whether nearly all values are larger, or smaller, than the one before, as those of a counter of a byte."""
-    steps = np.diff(column[np.argsort(lines)])
-    return (
-        len(np.unique(column)) >= _COUNTING and max((steps > 0.0).mean(), (steps < 0.0).mean()) >= 1.0 - _TIES
-    )
+def one_way(values: NDArray[np.float64]) -> float:
+    """Return the share of values that are larger than the one before, or smaller, if these are more."""
+    steps = np.diff(values)
+    return float(max((steps > 0.0).mean(), (steps < 0.0).mean()))
 
 
 def _follows_in_labels(column: NDArray[np.float64], lines: NDArray[np.int64], labels: Sequence[str]) -> bool:
@@ -278,8 +279,7 @@ def _follows_in_labels(column: NDArray[np.float64], lines: NDArray[np.int64], la
     sizes = Counter(np.bincount(codes).tolist())
     if sum(times * math.lgamma(size + 1) for size, times in sizes.items()) < math.log(_ORDERS):
         return False
-    ranks, places = _ranks(column, codes), _ranks(lines.astype(np.float64), codes)
-    return abs(_correlation(ranks, places)) >= _FOLLOWS
+    return abs(_rank_correlation(column, lines.astype(np.float64), codes)) >= _FOLLOWS
 
 
 def follow_lines(values: NDArray[np.float64], labels: Sequence[str]) -> bool:
@@ -299,12 +299,15 @@ def follow_lines(values: NDArray[np.float64], labels: Sequence[str]) -> bool:
     within = (_ranks(lines, codes) + (counts[codes] - 1) / 2.0).astype(np.int64)
     parts = codes * len(given) + within // LEAST_LINES
     parts = np.unique(parts, return_inverse=True)[1]
-    whole, near = (_correlation(_ranks(column, groups), _ranks(lines, groups)) for groups in (codes, parts))
+    whole, near = (_rank_correlation(column, lines, groups) for groups in (codes, parts))
     return abs(whole) >= _DRIFTS and whole * near > 0.0 and abs(near) >= _DRIFTS_NEAR
 
 
-def _correlation(ranks: NDArray[np.float64], places: NDArray[np.float64]) -> float:
-    """Return the correlation of numbers whose means are zero; 0 if those of one do not differ."""
+def _rank_correlation(
+    values: NDArray[np.float64], lines: NDArray[np.float64], codes: NDArray[np.int64]
+) -> float:
+    """Return the correlation of the ranks within groups; 0 if those of one do not differ."""
+    ranks, places = _ranks(values, codes), _ranks(lines, codes)
     scale = math.sqrt(float(ranks @ ranks) * float(places @ places))
     return float(ranks @ places) / scale if scale > 0.0 else 0.0
 
