@@ -61,7 +61,7 @@ def camera_figure(title: str, images: ImageTrace, shape: TactileArray, times: Ma
         caption = f"Black is {number(scale.low)}, white {number(scale.high)} {shape.unit}"
         caption += ", of the length of the numbers of a cell" if shape.components > 1 else ""
     picture = Picture(0.0)
-    picture.text(2, 14, title, bold=True, size=13)
+    picture.title(title)
     room = (picture.width - GAP * (max(len(times), 1) - 1)) / max(len(times), 1)
     width = min(room, TALLEST * shape.columns / shape.rows)
     height = width * shape.rows / shape.columns

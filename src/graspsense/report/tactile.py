@@ -102,7 +102,7 @@ def _figure(
     )
     layout = layout_of(shape)
     picture = Picture(0.0)
-    picture.text(2, 14, title, bold=True, size=13)
+    picture.title(title)
     maps = max(len(times), 1)
     room = (picture.width - GAP * (maps - 1)) / maps
     width = min(room, layout.columns * LARGEST_CELL, TALLEST / layout.height)
