@@ -25,7 +25,9 @@ MOST_CELLS: Final = 1024
 LARGEST: Final = 112
 """Pixels of the longer side of a picture: the cells behind a pixel are averaged."""
 GAP: Final = 14.0
+"""Between two pictures or maps of an array."""
 TALLEST: Final = 190.0
+"""Limit on the height of a picture or map."""
 
 
 def is_picture(shape: TactileArray) -> bool:

@@ -14,16 +14,12 @@ from attrs import frozen
 from graspsense.core.values.channel import FLOATS, Channel, TactileArray
 from graspsense.core.values.trace import Floats, ImageTrace, Trace
 from graspsense.core.values.units import display_unit, without_underscores
-from graspsense.report.camera import camera_figure, is_picture
+from graspsense.report.camera import GAP, TALLEST, camera_figure, is_picture
 from graspsense.report.heat import COLOURS, HeatScale
 from graspsense.report.html import figure
 from graspsense.report.moments import array_images, images_at, moments
 from graspsense.report.svg import QUIET, Picture, number
 
-GAP: Final = 14.0
-"""Between two maps of a picture."""
-TALLEST: Final = 190.0
-"""Limit on the height of a map."""
 LARGEST_CELL: Final = 34.0
 CELL_RIM: Final = 0.06
 """The part of a cell's width that stays free on each side."""
