@@ -118,11 +118,11 @@ def test_every_result_is_made_again_or_says_of_when_it_is():
         assert re.search(r"\d November 2026|date 2026-|commit [0-9a-f]{8}", results(name)), name
 
 
-def assert_same_rates(text, today, *begin, first=None, within=SAME_ON_ANY_PROCESSOR):
+def assert_same_rates(text, today, *begin, most=None):
     """Assert that the percentages in the row that begins with these cells are those that are printed today."""
-    told, measured = (rates(row(of, *begin))[:first] for of in (text, today))
+    told, measured = (rates(row(page_or_output, *begin))[:most] for page_or_output in (text, today))
     assert told
-    assert measured == pytest.approx(told, abs=within), begin
+    assert measured == pytest.approx(told, abs=SAME_ON_ANY_PROCESSOR), begin
 
 
 @pytest.mark.slow
@@ -140,7 +140,7 @@ def test_a_comparison_of_classifiers_is_the_one_of_today(options, classifiers, f
     stored = next(part for part in results("recognition").split("    $ graspsense") if options in part)
     for classifier in classifiers:
         for name in features:
-            assert_same_rates(stored, today, classifier, name, first=2)
+            assert_same_rates(stored, today, classifier, name, most=2)
 
 
 @pytest.mark.slow
@@ -164,10 +164,10 @@ def test_certainties_are_those_of_today():
     ).stdout
     table = re.findall(r"^\| ([^|]*10 trials[^|]*) \| (\d+ to \d+ %) \| (.*)$", text, re.MULTILINE)
     assert len(table) > 8
-    for rests_on, certainty, rest in table:
+    for rests_on, certainty, cells in table:
         line = next(line for line in today.splitlines() if line.startswith(f"{rests_on}, {certainty} "))
         shown = rates(line.removeprefix(f"{rests_on}, {certainty}"))[:2]
-        assert shown == pytest.approx(rates(rest)[:2], abs=0.02)
+        assert shown == pytest.approx(rates(cells)[:2], abs=0.02)
 
 
 @pytest.mark.slow

@@ -152,8 +152,8 @@ class Picture:
 
     def title(self, words: str) -> None:
         """Draw the title in one line; the caption has what there is no room for."""
-        first, *further = lines_within(words, self.width - 30, 13)
-        self.text(2, 14, f"{first}…" if further else first, bold=True, size=13)
+        line, *further = lines_within(words, self.width - 30, 13)
+        self.text(2, 14, f"{line}…" if further else line, bold=True, size=13)
 
     def text(
         self,

@@ -57,9 +57,9 @@ def tactile_figures(trace: Trace, channels: Sequence[Channel]) -> list[str]:
     declared = {channel.name: channel for channel in channels if isinstance(channel, TactileArray)}
     figures, pictures = [], []
     for name, sides in array_images(trace).items():
-        (first, *_), shape = sides.values(), declared.get(name)
-        if shape is None or first.cells.shape[1:] != shape.shape:
-            shape = _as_delivered(name, trace.units.get(name, "unknown"), first)
+        (images, *_), shape = sides.values(), declared.get(name)
+        if shape is None or images.cells.shape[1:] != shape.shape:
+            shape = _as_delivered(name, trace.units.get(name, "unknown"), images)
         title = "fingertips" if name == "pads" else without_underscores(name)
         if is_picture(shape):
             pictures += [
