@@ -282,7 +282,11 @@ def test_a_model_in_an_installed_package_counts(tmp_path, monkeypatch):
 
 
 @every_case(
-    "source", ["s", "s/store.sqlite", "store:s", "manifest:m.toml", "identified:m.toml,n.toml", "t.parquet"]
+    "source",
+    [
+        *("s", "s/store.sqlite", "store:s", "manifest:m.toml", "identified:m.toml,n.toml", "t.parquet"),
+        *("~/t.parquet", "identified:~/m.toml,n.toml", "store:~/s"),
+    ],
 )
 def test_paths_are_relative_to_the_folder_of_the_file_wherever_it_is_read(tmp_path, monkeypatch, source):
     with Store.open(tmp_path / "s") as store:
@@ -290,8 +294,10 @@ def test_paths_are_relative_to_the_folder_of_the_file_wherever_it_is_read(tmp_pa
     for name in ("m.toml", "n.toml", "t.parquet"):
         (tmp_path / name).write_text("")
     monkeypatch.chdir(tmp_path.parent)
+    monkeypatch.setenv("HOME", str(tmp_path))
     located = _located({"data": {"source": source}}, tmp_path)["data"]["source"]
     assert located.count(str(tmp_path)) == 1 + source.count(",")
+    assert "~" not in located
 
 
 def test_files_that_a_manifest_describes_count_wherever_they_are(tmp_path):
@@ -354,6 +360,22 @@ def test_the_code_of_a_plugin_and_its_version_count(tmp_path, monkeypatch):
     law.write_text("a = 333")
     assert input_content.developed_code("my_plugin.law") not in ("", developed)
     assert input_content.developed_code("attrs.anything") == ""
+
+
+def test_the_code_of_a_library_that_is_developed_beside_its_plugin_counts(tmp_path, monkeypatch):
+    about = tmp_path / "plugin" / "lab_plugin-1.0.dist-info" / "METADATA"
+    about.parent.mkdir(parents=True)
+    needs = "".join(f"Requires-Dist: {name}\n" for name in ("lab-law", "attrs", "lab-lost", "graspsense"))
+    about.write_text(f"Metadata-Version: 2.1\nName: lab-plugin\nVersion: 1.0\n{needs}")
+    (tmp_path / "library" / "lab_law").mkdir(parents=True)
+    (tmp_path / "library" / "lab_law" / "__init__.py").write_text("a = 1")
+    for place in ("plugin", "library"):
+        monkeypatch.syspath_prepend(tmp_path / place)
+    assert input_content._developed_libraries("lab-plugin") == ["lab_law"]
+    assert "lab_law" not in input_content._developed_libraries("graspsense")
+    part = next(part for part in installed().components() if part.qualified == "graspsense/knn")
+    monkeypatch.setattr(input_content, "_developed_libraries", lambda distribution: ["lab_law"])
+    assert ("", "lab_law") in input_content._codes()[part.qualified]
 
 
 def test_the_components_of_a_task_are_inputs(tmp_path):

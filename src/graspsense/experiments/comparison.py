@@ -17,6 +17,7 @@ from graspsense.experiments.cases import shown
 from graspsense.experiments.experiment import PIPELINE_TABLES, ExperimentCase
 from graspsense.experiments.results import EXPERIMENT, RESULTS, Results
 from graspsense.experiments.summary import ConditionResult, Summary, summary_of
+from graspsense.recording.provenance import commit_text
 from graspsense.report.wording import TARGETS
 
 ABSENT: Final = "not set"
@@ -236,12 +237,7 @@ def _circumstances(experiment: FinishedExperiment) -> dict[str, str]:
         for kind, table in (("content", "inputs"), ("version", "versions"))
         for name, value in (made.get(table) or {}).items()
     }
-    return {**circumstances, "commit": _commit(made)}
-
-
-def _commit(made: Mapping[str, Any]) -> str:
-    git = (made.get("git") or {}).get("graspsense") or {}
-    return str(git.get("commit", "unknown"))[:12]
+    return {**circumstances, "commit": commit_text(made)}
 
 
 def _differences(experiments: Sequence[FinishedExperiment]) -> list[ConditionDifference]:

@@ -4,19 +4,16 @@ from __future__ import annotations
 
 import os
 import platform
-import re
 from collections.abc import Mapping
-from contextlib import suppress
 from datetime import date
 from functools import cache
-from importlib.metadata import PackageNotFoundError, requires, version
+from importlib.metadata import PackageNotFoundError, version
 from typing import Final
 
 from graspsense.core.components.registry import installed
-from graspsense.sources.input_content import FRAMEWORK, developed_code
+from graspsense.sources.input_content import FRAMEWORK, developed_code, required_by
 
 _LIBRARIES: Final = ("numpy", "scipy", "scikit-learn", "numba")
-_REQUIREMENT: Final = re.compile(r"([\w.-]+)(?!.*\bextra\b)")
 
 
 @cache
@@ -31,7 +28,7 @@ def versions() -> Mapping[str, str]:
         code = developed_code(status.module)[:8]
         words = f"{status.version}+{code}" if code else status.version
         if status.state == "loaded" and status.distribution != FRAMEWORK:
-            libraries |= _required_by(status.distribution)
+            libraries |= required_by(status.distribution)
         versions_here[status.distribution] = (
             words if status.state == "loaded" else f"{words} ({status.state})"
         )
@@ -41,14 +38,6 @@ def versions() -> Mapping[str, str]:
         except PackageNotFoundError:
             versions_here[name] = "not installed"
     return versions_here
-
-
-def _required_by(distribution: str) -> set[str]:
-    """Return the distributions that a plugin needs; those of graspsense itself are `_LIBRARIES`."""
-    needed: list[str] = []
-    with suppress(PackageNotFoundError):
-        needed = requires(distribution) or []
-    return {re.sub(r"[-_.]+", "-", name[1]).lower() for name in map(_REQUIREMENT.match, needed) if name}
 
 
 def measured_on() -> dict[str, str]:

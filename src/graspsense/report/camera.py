@@ -25,7 +25,9 @@ MOST_CELLS: Final = 1024
 LARGEST: Final = 112
 """Pixels of the longer side of a picture: the cells behind a pixel are averaged."""
 GAP: Final = 14.0
+"""Between two pictures or maps of an array."""
 TALLEST: Final = 190.0
+"""Limit on the height of a picture or map."""
 
 
 def is_picture(shape: TactileArray) -> bool:
@@ -61,7 +63,7 @@ def camera_figure(title: str, images: ImageTrace, shape: TactileArray, times: Ma
         caption = f"Black is {number(scale.low)}, white {number(scale.high)} {shape.unit}"
         caption += ", of the length of the numbers of a cell" if shape.components > 1 else ""
     picture = Picture(0.0)
-    picture.text(2, 14, title, bold=True, size=13)
+    picture.title(title)
     room = (picture.width - GAP * (max(len(times), 1) - 1)) / max(len(times), 1)
     width = min(room, TALLEST * shape.columns / shape.rows)
     height = width * shape.rows / shape.columns

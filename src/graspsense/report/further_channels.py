@@ -69,7 +69,7 @@ def _figure(trace: Trace, channel: Channel, t: Floats, lines: Mapping[str, Float
     if len(t) < 2 or not len(every):
         return ""
     picture = Picture(0.0)
-    picture.text(2, 14, title, bold=True, size=13)
+    picture.title(title)
     x_scale = AxisScale(float(t[0]), float(t[-1]), 42, picture.width - 10)
     y_scale = reaching([float(every.min()), float(every.max())], 150, 44)
     when = f"{time} since the squeeze began" if contact is not None else time

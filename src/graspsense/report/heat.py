@@ -56,7 +56,7 @@ class HeatScale:
             picture.box(left + k * step, y, step, 10, colour)
         for share, anchor in ((0.0, "start"), (0.5, "middle"), (1.0, "end")):
             value = self.low + share * (self.high - self.low)
-            words = _short_number(value)
+            words = number(float(f"{value:.3g}"))
             picture.text(
                 left + share * width,
                 y + 23,
@@ -85,7 +85,3 @@ def heat_rows(
         picture.parts.append(
             f'<path d="{"".join(parts)}" fill="{COLOURS[level]}" shape-rendering="crispEdges"/>'
         )
-
-
-def _short_number(value: float) -> str:
-    return number(float(f"{value:.3g}"))

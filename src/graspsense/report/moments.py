@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from graspsense.core.values.signals import Phase
 from graspsense.core.values.trace import Floats, ImageTrace, Integers, Trace
-from graspsense.core.values.units import without_underscores
 
 BEFORE_CONTACT_S: Final = 0.8
 """How much of the approach is shown where time is in seconds: the rest is motion through free air."""
@@ -94,13 +93,16 @@ def number_of_each(images: ImageTrace, cells: NDArray[Any]) -> Floats:
     return numbers.ravel()
 
 
-def array_images(trace: Trace) -> dict[str, ImageTrace]:
-    """Return the images of every tactile array that delivered one, by the name of the array and of its side."""
+def array_images(trace: Trace) -> dict[str, dict[str, ImageTrace]]:
+    """Return the images of every tactile array that delivered one, by the names of the array and of its side.
+
+    An array has one side without a name, but for the two fingertips of `pads`.
+    """
     arrays = {}
     if len(trace.pad_t_s) and trace.pad_left.shape[1]:
-        arrays["left fingertip"] = ImageTrace(t_s=trace.pad_t_s, cells=trace.pad_left)
-        arrays["right fingertip"] = ImageTrace(t_s=trace.pad_t_s, cells=trace.pad_right)
+        sides = {"left": trace.pad_left, "right": trace.pad_right}
+        arrays["pads"] = {side: ImageTrace(t_s=trace.pad_t_s, cells=cells) for side, cells in sides.items()}
     for name, signal in trace.signals.items():
         if isinstance(signal, ImageTrace) and len(signal.t_s) and signal.cells[0].size:
-            arrays[without_underscores(name)] = signal
+            arrays[name] = {"": signal}
     return arrays

@@ -150,6 +150,11 @@ class Picture:
             f'<path d="{path}" stroke="{ink}" stroke-width="3" stroke-linecap="round" stroke-opacity="0.6"{named}/>'
         )
 
+    def title(self, words: str) -> None:
+        """Draw the title in one line; the caption has what there is no room for."""
+        line, *further = lines_within(words, self.width - 30, 13)
+        self.text(2, 14, f"{line}…" if further else line, bold=True, size=13)
+
     def text(
         self,
         x: float,

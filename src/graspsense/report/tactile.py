@@ -14,16 +14,12 @@ from attrs import frozen
 from graspsense.core.values.channel import FLOATS, Channel, TactileArray
 from graspsense.core.values.trace import Floats, ImageTrace, Trace
 from graspsense.core.values.units import display_unit, without_underscores
-from graspsense.report.camera import camera_figure, is_picture
+from graspsense.report.camera import GAP, TALLEST, camera_figure, is_picture
 from graspsense.report.heat import COLOURS, HeatScale
 from graspsense.report.html import figure
-from graspsense.report.moments import images_at, moments
+from graspsense.report.moments import array_images, images_at, moments
 from graspsense.report.svg import QUIET, Picture, number
 
-GAP: Final = 14.0
-"""Between two maps of a picture."""
-TALLEST: Final = 190.0
-"""Limit on the height of a map."""
 LARGEST_CELL: Final = 34.0
 CELL_RIM: Final = 0.06
 """The part of a cell's width that stays free on each side."""
@@ -59,42 +55,28 @@ def tactile_figures(trace: Trace, channels: Sequence[Channel]) -> list[str]:
     cameras are drawn as pictures instead.
     """
     declared = {channel.name: channel for channel in channels if isinstance(channel, TactileArray)}
-    arrays: list[tuple[str, dict[str, ImageTrace], TactileArray]] = []
-    pictures: list[str] = []
-    if len(trace.pad_t_s) and trace.pad_left.shape[1]:
-        cells = trace.pad_left.shape[1]
-        fingertips = {
-            "left": ImageTrace(t_s=trace.pad_t_s, cells=trace.pad_left),
-            "right": ImageTrace(t_s=trace.pad_t_s, cells=trace.pad_right),
-        }
-        shape = declared.get("pads")
-        if shape is None or shape.cells != cells:
-            shape = TactileArray("pads", trace.units.get("pads", "counts"), rows=1, columns=cells)
+    figures, pictures = [], []
+    for name, sides in array_images(trace).items():
+        (images, *_), shape = sides.values(), declared.get(name)
+        if shape is None or images.cells.shape[1:] != shape.shape:
+            shape = _as_delivered(name, trace.units.get(name, "unknown"), images)
+        title = "fingertips" if name == "pads" else without_underscores(name)
         if is_picture(shape):
             pictures += [
-                camera_figure(f"{side} fingertip", fingertip, shape, moments(trace))
-                for side, fingertip in fingertips.items()
+                camera_figure(f"{side} fingertip" if side else title, images, shape, moments(trace))
+                for side, images in sides.items()
             ]
         else:
-            arrays.append(("fingertips", fingertips, shape))
-    for name, signal in trace.signals.items():
-        if isinstance(signal, ImageTrace) and len(signal.t_s) and signal.cells[0].size:
-            shape = declared.get(name)
-            if shape is None or signal.cells.shape[1:] != shape.shape:
-                shape = _as_delivered(name, signal)
-            if is_picture(shape):
-                pictures.append(camera_figure(without_underscores(name), signal, shape, moments(trace)))
-                continue
-            arrays.append((without_underscores(name), {shape.finger: signal}, shape))
-    return [*(_figure(title, images, shape, moments(trace)) for title, images, shape in arrays), *pictures]
+            figures.append(_figure(title, sides, shape, moments(trace)))
+    return [*figures, *pictures]
 
 
-def _as_delivered(name: str, images: ImageTrace) -> TactileArray:
+def _as_delivered(name: str, unit: str, images: ImageTrace) -> TactileArray:
     """Return an array that nobody has declared, as its images show it: floats in a row, other types by their shape."""
     dtype: Any = str(images.cells.dtype)
     sizes = images.cells.shape[1:]
     rows, columns, components = (1, *sizes, 1)[:3] if dtype == FLOATS or len(sizes) < 2 else (*sizes, 1)[:3]
-    return TactileArray(name, "unknown", rows=rows, columns=columns, components=components, dtype=dtype)
+    return TactileArray(name, unit, rows=rows, columns=columns, components=components, dtype=dtype)
 
 
 def _figure(
@@ -116,7 +98,7 @@ def _figure(
     )
     layout = layout_of(shape)
     picture = Picture(0.0)
-    picture.text(2, 14, title, bold=True, size=13)
+    picture.title(title)
     maps = max(len(times), 1)
     room = (picture.width - GAP * (maps - 1)) / maps
     width = min(room, layout.columns * LARGEST_CELL, TALLEST / layout.height)

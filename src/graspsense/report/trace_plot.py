@@ -34,7 +34,9 @@ def plot(trace: Trace) -> tuple[Any, Any]:
     require_matplotlib()
     from matplotlib import pyplot
 
-    arrays = array_images(trace)
+    arrays = {
+        (name, side): images for name, sides in array_images(trace).items() for side, images in sides.items()
+    }
     fast = {
         name: signal
         for name, signal in trace.signals.items()
@@ -45,16 +47,15 @@ def plot(trace: Trace) -> tuple[Any, Any]:
         len(heights), 1, figsize=(6.4, sum(heights)), layout="constrained", height_ratios=heights
     )
     force, gap, *others = rows
-    units = {without_underscores(name): unit for name, unit in trace.units.items()}
     gap.sharex(force)
     draw_trace(trace, force, gap)
     for axes, (name, signal) in zip(others, fast.items(), strict=False):
         axes.sharex(force)
         _draw_samples(trace, axes, name, signal)
-    for axes, (name, images) in zip(others[len(fast) :], arrays.items(), strict=True):
-        # Both fingertips are the channel `pads`.
-        unit = units.get("pads" if name.endswith("fingertip") else name, "")
-        figure.colorbar(_draw_array(trace, axes, name, images), ax=axes, label=unit)
+    for axes, ((name, side), images) in zip(others[len(fast) :], arrays.items(), strict=True):
+        title = f"{side} fingertip" if side else without_underscores(name)
+        unit = trace.units.get(name, "")
+        figure.colorbar(_draw_array(trace, axes, title, images), ax=axes, label=unit)
     show_literally(figure)
     return force, gap
 

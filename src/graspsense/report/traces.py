@@ -16,12 +16,12 @@ from graspsense.core.values.units import display_unit, in_words, without_undersc
 from graspsense.report.grasp_curve import GraspCurve, peak_in_words
 from graspsense.report.html import figure, folded, panels, table
 from graspsense.report.moments import phase_spans
-from graspsense.report.svg import DASHES, INKS, QUIET, SIZE, TEXT, AxisScale, Picture, reaching
+from graspsense.report.svg import DASHES, INKS, QUIET, SIZE, TEXT, AxisScale, Picture, lines_within, reaching
 
 STATES: Final = 8
 """Largest number of line styles in one picture."""
-LABEL: Final = 26
-"""Characters of a label beside a picture in one line."""
+LABEL: Final = 150.0
+"""Room for a line of a label beside a picture."""
 DRAWN: Final = 150
 """Largest number of dots per label. If there are more trials, every n-th is drawn."""
 PHASES: Final = {
@@ -83,7 +83,7 @@ def _traces(name: str, grasps: Sequence[GraspCurve], all_grasps: Sequence[GraspC
     """Return the figure of a class, on the axes of all classes."""
     states = list(dict.fromkeys(grasp.label for grasp in grasps))[:STATES]
     picture = Picture(BELOW + 15 * len(states))
-    picture.text(2, 14, name, bold=True, size=13)
+    picture.title(name)
     peaks = []
     drawn: list[tuple[GraspCurve, Mapping[str, Any]]] = []
     for k, label in enumerate(states):
@@ -181,12 +181,12 @@ def _feature(
         if value is not None:
             by_label[label].append(factor * value)
     missing = sum(value is None for value in column)
-    left = 12 + 6.1 * max(len(line) for label in by_label for line in _label_lines(label))
-    pitch = 19 if all(len(label) <= LABEL for label in by_label) else 24
+    left = 12 + 6.6 * max(len(line) for label in by_label for line in _label_lines(label))
+    pitch = 19 if all(len(_label_lines(label)) == 1 for label in by_label) else 24
     bottom = 34.0 + pitch * len(by_label)
     picture = Picture(bottom + 34)
     scale = reaching([v for values in by_label.values() for v in values], min(left, 165), picture.width - 12)
-    picture.text(2, 14, title, bold=True, size=13)
+    picture.title(title)
     picture.x_axis(scale, 24, bottom, shown or "value")
     classes = list(dict.fromkeys(map(class_of, by_label)))
     rows = [
@@ -231,12 +231,8 @@ def _feature_row(
 
 def _label_lines(label: str) -> list[str]:
     """Return a label in one line, or in two if it is long: the class and the state."""
-    if len(label) <= LABEL:
-        return [label]
+    lines = lines_within(label, LABEL)
     name, colon, state = label.partition(":")
-    if not colon or max(len(name), len(state)) > LABEL:
-        name, state = label[:LABEL], label[LABEL:]
-    return [
-        name + colon * (state != label[LABEL:]),
-        state if len(state) <= LABEL else f"{state[: LABEL - 1]}…",
-    ]
+    if len(lines) > 1 and colon and max(len(lines_within(part, LABEL)) for part in (name, state)) == 1:
+        return [name + colon, state]
+    return lines if len(lines) < 3 else [lines[0], f"{lines[1][:-1]}…"]

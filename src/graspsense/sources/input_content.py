@@ -14,6 +14,7 @@ from contextlib import suppress
 from functools import cache
 from glob import escape, glob
 from html import unescape
+from importlib.metadata import PackageNotFoundError, requires
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final
@@ -32,6 +33,7 @@ _OWN_PLUGINS: Final = "graspsense.plugins"
 _CALIBRATION: Final = "calibration"
 _OF_TRIALS: Final = """SELECT id, recording, recording_bytes, sha256, label, instance, set_aside, hex("values")
     FROM trial JOIN detail ON detail.trial = id ORDER BY id"""
+_REQUIREMENT: Final = re.compile(r"([\w.-]+)(?!.*\bextra\b)")
 _QUOTED: Final = re.compile(r"\"[^\"\n]{1,1000}\"|'[^'\n]{1,1000}'")
 
 
@@ -110,9 +112,11 @@ def located_text(text: str, base: Path) -> str:
     if not colon or os.path.isfile(base / _path(text)):
         path = base / _path(text)
         is_input = (os.path.isfile(path) and path.suffix) or as_source(str(path)).startswith(STORE)
-        return str(base.absolute() / text) if is_input else text
+        return str(base.absolute() / os.path.expanduser(text)) if is_input else text
     located = [
-        str(base.absolute() / place) if place and os.path.exists(base / _path(place)) else place
+        str(base.absolute() / os.path.expanduser(place))
+        if place and os.path.exists(base / _path(place))
+        else place
         for place in places.split(",")
     ]
     return f"{kind}:{','.join(located)}"
@@ -134,6 +138,7 @@ def _codes() -> dict[str, list[tuple[str, str]]]:
         )
     for part in installed().components():
         code = [(part.version, part.entry.target.partition(":")[0]), *added.get(part.distribution, [])]
+        code += [("", name) for name in _developed_libraries(part.distribution)]
         codes.setdefault(part.qualified, []).extend(code)
         if part.distribution != FRAMEWORK:
             codes.setdefault(part.name, []).extend(code)
@@ -155,6 +160,22 @@ def _hash_of_code(version: str, module: str) -> str:
     places = _places_of_package(package)
     places += [beside for place in places for beside in _developed_beside(place)]
     return _hash([version, *map(_hash_of_tree, places)])
+
+
+def required_by(distribution: str) -> set[str]:
+    """Return the distributions that this one needs, without those of its extras."""
+    needed: list[str] = []
+    with suppress(PackageNotFoundError):
+        needed = requires(distribution) or []
+    return {re.sub(r"[-_.]+", "-", name[1]).lower() for name in map(_REQUIREMENT.match, needed) if name}
+
+
+@cache
+def _developed_libraries(distribution: str) -> list[str]:
+    """Return the packages that this one needs and that are developed too, in folders of their own."""
+    packages = sorted(name.replace("-", "_") for name in required_by(distribution) - {FRAMEWORK})
+    places = {package: _places_of_package(package) for package in packages}
+    return [package for package in packages if places[package] and all(map(_is_developed, places[package]))]
 
 
 def developed_code(module: str) -> str:
