@@ -12,7 +12,8 @@ from graspsense.sources.formats.reading_process import read_by
 
 SPREADSHEET_SUFFIXES: Final = (".xlsx", ".xlsm", ".xlsb", ".xls", ".ods")
 SPREADSHEET_HINT: Final = (
-    "spreadsheets need python-calamine: save the sheet as CSV in UTF-8, or install it.\n"
+    'spreadsheets need python-calamine: install it, or save the sheet as "CSV UTF-8" (Excel) or "Text CSV" '
+    "(LibreOffice).\n"
     '  in a clone: pip install -e ".[spreadsheets]"     published: pip install "graspsense[spreadsheets]"'
 )
 
