@@ -252,7 +252,7 @@ def bumped(newtons, force):
     [
         (FOUR, None, 4, None),
         # The third one has 5 % of the force of the others.
-        ((1.0, 1.0, 0.05, 1.0), None, 3, "taken for no squeeze"),
+        ((1.0, 1.0, 0.05, 1.0), None, 3, "the fingers close 1 time.*without a squeeze"),
         # A closing whose force was not measured, or is zero.
         (FOUR, lambda force: without(force, 1200, 1800, np.nan), 3, "the fingers close 1 time.*has no number"),
         (FOUR, lambda force: without(force, 1200, 1800, 0.0), 3, "the fingers close 1 time.*without a squeeze"),

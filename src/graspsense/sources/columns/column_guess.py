@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 from attrs import frozen
 
+from graspsense.sources.columns.grasp_columns import is_channel_name
 from graspsense.sources.formats.patterns import wildcard
 from graspsense.sources.formats.table import ColumnTable, Numbers
 from graspsense.sources.units import GRAM_FORCE, TO_SI, WITHOUT_UNIT, known_unit, unit_since_1970
@@ -250,9 +251,10 @@ def _channels(table: ColumnTable, forces: Sequence[str], unit: str) -> Iterator[
     columns += [(group, unit) for group in _numbered_groups(forces) if len(group) >= _FEWEST_CELLS]
     named = {}
     for group, its_unit in columns:
-        key = re.sub("[^a-z0-9]+", "_", _cell_pattern(group[0]).lower()).strip("_") or "array"
+        key = re.sub("[^a-z0-9]+", "_", _cell_pattern(group[0]).lower()).strip("_") or "all"
         patterns = _together(table, group)
-        if key[0].isalpha() and len(patterns) == 1:
+        key = key if is_channel_name(key) else f"cells_{key}"
+        if len(patterns) == 1:
             named[key] = f'{key} = "{patterns[0]} {its_unit}"'
     if named:
         yield Guess(

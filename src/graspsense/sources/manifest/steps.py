@@ -64,7 +64,7 @@ def squeezes(columns: GraspColumns) -> list[GraspColumns]:
     it is, as after a change of its zero.
     """
     force = _known_force(columns)
-    runs = _of_one_closing(columns.gap_m, _held_runs(force, np.diff(columns.t_s)))
+    runs = _of_one_closing(columns.gap_m, held_runs(force, np.diff(columns.t_s)))
     runs = list(_divided(columns, force, runs))
     if not runs:
         raise DataDamaged(f"{columns.source}: no squeeze was found, because its force never rises")
@@ -143,7 +143,7 @@ def _middle(t_s: Numbers, end: int, begin: int) -> int:
     return end + int(back[0]) if len(back) else (end + begin) // 2
 
 
-def _held_runs(force: Numbers, steps_s: Numbers) -> list[tuple[int, int]]:
+def held_runs(force: Numbers, steps_s: Numbers) -> list[tuple[int, int]]:
     """Return the first sample of each squeeze and the one after its last."""
     noise = NOISE * float(np.median(np.abs(np.diff(force, 2)))) if len(force) > 2 else 0.0
     around = np.pad(force, FEWEST - 1, mode="edge")
