@@ -179,10 +179,11 @@ def _cell_pattern(name: str) -> str:
 
 def _together(table: ColumnTable, names: Sequence[str]) -> list[str]:
     """Return the columns as an expression names them: by patterns, where these stand for no others."""
+    several = len(names) > 1 and "[" not in names[0]  # brackets would be a choice of signs
     for patterns in (map(_cell_pattern, names), (re.sub("[0-9]", "?", name) for name in names)):
-        distinct = [*dict.fromkeys(patterns)]
-        found = {name for name in table.numbers if any(wildcard(p).fullmatch(name) for p in distinct)}
-        if len(names) > 1 and found == set(names):
+        distinct = [*dict.fromkeys(patterns)] if several else []
+        matched = {name for name in table.numbers if any(wildcard(p).fullmatch(name) for p in distinct)}
+        if matched == set(names):
             return [quoted(pattern) for pattern in distinct]
     return [*map(quoted, names)]
 
