@@ -102,9 +102,9 @@ def _of_one_closing(gap: Numbers, runs: list[tuple[int, int]]) -> list[tuple[int
             start, earlier = joined[-1]
             between, narrowest = gap[earlier - 1 : begin + 1], np.nanmin(gap[start:earlier], initial=np.inf)
             closes = between[0] - between[-1] > least and np.nanmax(between) < between[0] + least
-            if (
-                closes and between[0] < narrowest + least
-            ):  # in a squeeze with a force that stuck, they had opened
+            # In a squeeze with a force that stuck they had opened, and a gap that stopped shows no closing.
+            stopped = not np.ptp(gap[start:earlier]) > 0.0
+            if closes and between[0] < narrowest + least and not stopped:
                 begin = joined.pop()[0]
         joined.append((begin, end))
     return joined
