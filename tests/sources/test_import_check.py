@@ -2,14 +2,17 @@
 
 import shutil
 import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
+from cases import every_case
 from commands import graspsense, printed
 from recorded_files import write_topics
 from repository import ROOT
 
 from graspsense.sources.columns.channel_facts import channel_facts
+from graspsense.sources.manifest.reader import read_recordings
 
 SAMPLES = ROOT / "samples"
 N = 300
@@ -116,6 +119,41 @@ def test_columns_named_after_both_fingers_are_forces_if_their_numbers_look_like_
     printed("import", tmp_path, "--suggest", tmp_path / "m.toml")
     suggested = tomllib.loads((tmp_path / "m.toml").read_text())
     assert {"force", "left", "right"} & suggested.keys() == keys
+
+
+CELLS = {
+    "a grid for each side": ("L{0}{1}", "R{0}{1}", ["L??"], ["R*"]),
+    "a grid in the words of another": ("left_r{0}c{1}", "right_r{0}c{1}", ["left_r*c*"], ["right_r*c*"]),
+    "numbers behind a finger": ("finger0_t{0}{1}", "finger1_t{0}{1}", ["finger0_t*"], ["finger1_t*"]),
+    "numbers in front": ("{0}{1}_left", "{0}{1}_right", ["*_left"], ["*_right"]),
+    "one sensor": ("x{0}y{1}", "", ["x*y*"], []),
+    "names that begin as others do": ("t{0}{1}", "", ["t??"], []),
+    "signs of patterns": ("p[{0}][{1}]", "", ["'p[0][0]', 'p[0][1]'"], []),
+}
+
+
+@every_case("names", CELLS)
+def test_the_cells_of_sensors_are_forces_whatever_their_names(names: str, tmp_path: Path) -> None:
+    """Not those that move before the fingers touch, such as the joints of an arm."""
+    left, right, *patterns = CELLS[names]
+    gap = np.clip(60.0 - 20.0 * T_S, 50.0, None)
+    force = np.interp(T_S, [0.5, 1.0, 2.5, 2.6], [0.0, 8.0, 8.0, 0.0])
+    cells = np.random.default_rng(0).uniform(0.2, 1.0, 16)
+    for name in ("jar_1", "jar_2"):
+        columns = {"time": T_S, "Lift": T_S % 0.5, "gap (mm)": gap}
+        for k, weight in enumerate(cells.tolist()):
+            columns |= {side.format(k // 4, k % 4): weight * force for side in (left, right) if side}
+            columns |= {f"q{k}": weight * T_S}
+        table(tmp_path / f"{name}.csv", columns)
+    printed("import", tmp_path, "--suggest", tmp_path / "m.toml")
+    suggested = tomllib.loads((tmp_path / "m.toml").read_text())
+    keys = ("left", "right") if right else ("force",)
+    assert [pattern in suggested[key] for key, (pattern, *_) in zip(keys, patterns, strict=False)] == [
+        True
+    ] * len(keys)
+    for grasp in read_recordings(str(tmp_path / "m.toml")):
+        (felt,) = grasp.recording.columns("force_left_n")
+        assert np.corrcoef(felt, force)[0, 1] > 0.99
 
 
 def test_what_the_file_states_is_not_questioned(tmp_path):

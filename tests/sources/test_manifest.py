@@ -252,7 +252,7 @@ def bumped(newtons, force):
     [
         (FOUR, None, 4, None),
         # The third one has 5 % of the force of the others.
-        ((1.0, 1.0, 0.05, 1.0), None, 3, "taken for no squeeze"),
+        ((1.0, 1.0, 0.05, 1.0), None, 3, "the fingers close 1 time.*without a squeeze"),
         # A closing whose force was not measured, or is zero.
         (FOUR, lambda force: without(force, 1200, 1800, np.nan), 3, "the fingers close 1 time.*has no number"),
         (FOUR, lambda force: without(force, 1200, 1800, 0.0), 3, "the fingers close 1 time.*without a squeeze"),
@@ -278,6 +278,15 @@ def test_a_pad_that_fails_at_the_narrowest_of_several_objects_is_not_turned(tmp_
     text = 'files = "{label}.csv"\nsplit = "force"\ntime = "t"\ngap = "gap [mm]"\nleft = "L"\nright = "R"'
     squeezes = recordings(tmp_path, text)
     assert ["left pad" in " ".join(squeeze.notices) for squeeze in squeezes] == [True, False, False]
+
+
+def test_a_gap_that_stops_for_a_squeeze_does_not_join_it_with_the_next(tmp_path):
+    gaps, force, time = repeated(*FOUR)
+    stopped = np.where(np.arange(2400) // 600 == 2, gaps[1200], gaps)
+    squeezes = squeezes_of(tmp_path, force, stopped, time)
+    narrowest = [float(column(squeeze, "gap_m").min()) for squeeze in squeezes]
+    assert narrowest == pytest.approx([gaps.min(), gaps.min(), gaps[1200], gaps.min()], abs=1e-3)
+    assert [bool(squeeze.notices) for squeeze in squeezes] == [False, False, True, False]
 
 
 def test_a_force_that_drops_out_while_the_gap_stays_is_told(tmp_path):

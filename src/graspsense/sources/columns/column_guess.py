@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
+from collections.abc import Iterable, Iterator, Sequence, Set
 from typing import Final
 
 import numpy as np
 from attrs import frozen
 
+from graspsense.sources.columns.grasp_columns import is_channel_name
+from graspsense.sources.formats.patterns import wildcard
 from graspsense.sources.formats.table import ColumnTable, Numbers
 from graspsense.sources.units import GRAM_FORCE, TO_SI, WITHOUT_UNIT, known_unit, unit_since_1970
 
@@ -34,11 +36,17 @@ _EVEN, _MOSTLY = 0.2, 0.9
 EFFORT_WORDS: Final = frozenset(("effort", "eff", "torque", "current"))
 FINGER_WORDS: Final = frozenset(("finger", "fingertip", "tip", "pad", "jaw"))
 """A column that is named after a finger alone is its force or its position; its numbers tell which."""
+_UNLOADED: Final = 4
+"""Samples at the beginning of a recording that are taken for those of free fingers."""
 _FREE: Final = 0.1
-"""Largest share of its peak that a force has in the first quarter of a recording, before the fingers touch."""
+"""Largest share of its peak that a force has before the fingers touch."""
 _SIDES: Final = (("left", "right"), ("l", "r"))
 _FEWEST_CELLS: Final = 4
 """Numbered columns from which they are the cells of a sensor."""
+_UNNAMED: Final = re.compile(r"c[0-9]+").fullmatch
+"""A name that a reader gives to a column without one."""
+_NUMBER: Final = re.compile(rf"((?:{'|'.join(FINGER_WORDS)})[_ .-]?[0-9]+(?=.*[0-9]))|[0-9]+", re.IGNORECASE)
+"""A number in the name of a cell, but for that of its finger."""
 _COUNTS: Final = 20.0
 """Whole numbers up to more than this are counts."""
 
@@ -83,9 +91,10 @@ def guesses(table: ColumnTable) -> Iterator[Guess]:
     force = _mean(table, forces)
     if gap:
         yield _gap(table, gap, force)
-    yield from _forces(table, forces)
+    guessed = list(_forces(table, forces))
+    yield from guessed
     yield from _effort(table, force)
-    yield from _channels(table)
+    yield from _channels(table, forces, guessed[0].value.rpartition(" ")[2])
 
 
 def time_column(table: ColumnTable) -> str | None:
@@ -104,7 +113,7 @@ def _evenly_rising(table: ColumnTable, rising: Sequence[str]) -> list[str]:
         steps = np.diff(table.numbers[name])
         step = float(np.median(steps))
         even = bool(np.mean(np.abs(steps - step) <= _EVEN * step) > _MOSTLY) and step != 1.0
-        if even and re.fullmatch(r"c\d+", name):
+        if even and _UNNAMED(name):
             candidates.append(name)
     return sorted(
         candidates, key=lambda name: bool((table.numbers[name] == np.round(table.numbers[name])).all())
@@ -118,33 +127,65 @@ def force_columns(table: ColumnTable, time: str | None) -> tuple[str, ...]:
     others = _with_words(columns, GAP_WORDS | {"torque"})
     named = [name for name in _with_words(columns, FORCE_WORDS) if name not in others]
     strong = _with_words(named, FORCE_WORDS - {"f", "n", "g"})
-    return tuple(stated or strong or named or _forces_of_fingers(table, columns))
+    return tuple(stated or strong or named or _unnamed_forces(table, columns))
 
 
-def _forces_of_fingers(table: ColumnTable, columns: Sequence[str]) -> list[str]:
-    """Return the columns of both fingers if these are named by nothing else, and none moves before it is pressed."""
+def _unnamed_forces(table: ColumnTable, columns: Sequence[str]) -> list[str]:
+    """Return the columns of both fingers, or else of cells, that no word names, if none moves before it is pressed."""
     named = _with_words(columns, FINGER_WORDS)
     fingers = [name for name in named if not known_unit(table.units.get(name, ""), "gap")]
-    sided = any(_sided(fingers, pair) for pair in _SIDES)
-    return fingers if sided and all(map(_rises_late, (table.numbers[name] for name in fingers))) else []
+    if any(_sided(fingers, pair) for pair in _SIDES) and all(_rises_late(table, [name]) for name in fingers):
+        return fingers
+    others = [
+        name
+        for name in columns
+        if not (GAP_WORDS | EFFORT_WORDS) & set(words_of(name)) and not _UNNAMED(name)
+    ]
+    groups = [group for group in _numbered_groups(others) if _are_cells(table, group)]
+    return [name for group in groups if _rises_late(table, group) for name in group]
 
 
-def _rises_late(values: Numbers) -> bool:
-    """Return whether numbers are nearly zero in the first quarter and not later, as a force is."""
-    known = np.abs(values[np.isfinite(values)])
-    return len(known) >= 4 and float(known[: len(known) // 4].max()) < _FREE * float(known.max())
+def _are_cells(table: ColumnTable, group: Sequence[str]) -> bool:
+    return sum(table.numbers[name].reshape(len(table), -1).shape[1] for name in group) >= _FEWEST_CELLS
 
 
-def numbered_groups(names: Sequence[str]) -> dict[str, list[str]]:
-    """Return columns that differ in the number at their end, by the pattern that stands for them.
+def _rises_late(table: ColumnTable, names: Sequence[str]) -> bool:
+    """Return whether numbers stay for most of the time in which they make half of their way, as a force does."""
+    values = np.column_stack([table.numbers[name] for name in names])
+    values = values[np.isfinite(values).all(axis=1)]
+    if len(values) < _UNLOADED:
+        return False
+    away = np.abs(values - np.median(values[:_UNLOADED], axis=0)).mean(axis=1)
+    away -= np.median(away[:_UNLOADED])
+    rising = away[: int((away > 0.5 * away.max()).argmax())]
+    return len(rising) > 0 and float((rising < _FREE * away.max()).mean()) > 0.5
 
-    >>> list(numbered_groups(["ff_1", "ff_2", "ff_3", "ff_4", "x"]))
-    ['ff_*']
+
+def _numbered_groups(names: Sequence[str]) -> list[list[str]]:
+    """Return columns in groups that differ in numbers only, each the cells of a sensor.
+
+    >>> _numbered_groups(["ff_0_1", "ff_0_2", "finger1_t1", "finger1_t2", "finger2_t1"])
+    [['ff_0_1', 'ff_0_2'], ['finger1_t1', 'finger1_t2'], ['finger2_t1']]
     """
     groups: dict[str, list[str]] = {}
     for name in names:
-        groups.setdefault(re.sub(r"\d+$", "*", name), []).append(name)
-    return {pattern: group for pattern, group in groups.items() if len(group) >= _FEWEST_CELLS}
+        groups.setdefault(_cell_pattern(name), []).append(name)
+    return list(groups.values())
+
+
+def _cell_pattern(name: str) -> str:
+    return _NUMBER.sub(lambda number: number[1] or "*", name)
+
+
+def _together(table: ColumnTable, names: Sequence[str]) -> list[str]:
+    """Return the columns as an expression names them: by patterns, where these stand for no others."""
+    several = len(names) > 1 and "[" not in names[0]  # brackets would be a choice of signs
+    for patterns in (map(_cell_pattern, names), (re.sub("[0-9]", "?", name) for name in names)):
+        distinct = [*dict.fromkeys(patterns)] if several else []
+        matched = {name for name in table.numbers if any(wildcard(p).fullmatch(name) for p in distinct)}
+        if matched == set(names):
+            return [quoted(pattern) for pattern in distinct]
+    return [*map(quoted, names)]
 
 
 def _gap_columns(table: ColumnTable, taken: Sequence[str | None]) -> tuple[str, ...]:
@@ -205,17 +246,21 @@ def _effort(table: ColumnTable, force: Numbers | None) -> Iterator[Guess]:
     yield Guess(key="effort", value="-" * opposed + quoted(name), check="its unit and its sign")
 
 
-def _channels(table: ColumnTable) -> Iterator[Guess]:
-    """Yield a line for the arrays, which are kept as channels."""
-    arrays = [name for name, values in table.numbers.items() if values.ndim == 2]
-    named = {_channel_name(name) or "array": name for name in arrays}
-    lines = [f'{key} = "{quoted(name)} [counts]"' for key, name in named.items() if key[0].isalpha()]
-    if lines:
-        yield Guess(key="channels", value=f"{{ {', '.join(lines)} }}", check="the units of the arrays")
-
-
-def _channel_name(name: str) -> str:
-    return re.sub("[^a-z0-9]+", "_", name.lower()).strip("_")
+def _channels(table: ColumnTable, forces: Sequence[str], unit: str) -> Iterator[Guess]:
+    """Yield a line for the arrays and the cells of sensors, which are kept as channels."""
+    columns = [([name], "[counts]") for name, values in table.numbers.items() if values.ndim == 2]
+    columns += [(group, unit) for group in _numbered_groups(forces) if len(group) >= _FEWEST_CELLS]
+    named = {}
+    for group, its_unit in columns:
+        key = re.sub("[^a-z0-9]+", "_", _cell_pattern(group[0]).lower()).strip("_") or "all"
+        patterns = _together(table, group)
+        key = key if is_channel_name(key) else f"cells_{key}"
+        if len(patterns) == 1:
+            named[key] = f'{key} = "{patterns[0]} {its_unit}"'
+    if named:
+        yield Guess(
+            key="channels", value=f"{{ {', '.join(named.values())} }}", check="their names and their units"
+        )
 
 
 def _forces(table: ColumnTable, names: Sequence[str]) -> Iterator[Guess]:
@@ -223,42 +268,22 @@ def _forces(table: ColumnTable, names: Sequence[str]) -> Iterator[Guess]:
     if not names:
         yield Guess(key="force", value="", check="no column is known to be a force: name it, with its unit")
         return
-    cells = numbered_groups(names)
-    if cells and sum(map(len, cells.values())) == len(names):
-        yield from _forces_of_cells(table, cells)
-        return
-    sides = next(
-        (pair_of_sides for pair in _SIDES if (pair_of_sides := _sided(names, pair)) is not None), None
-    )
-    several = table.numbers[names[0]].ndim == 2
-    if sides is None and len(names) == 2:
-        sides = (names[:1], names[1:])
-        said = f"{names[0]} is taken for the left side, {names[1]} for the right"
-    elif sides is None and len(names) > 2:
-        sides = (names[:-1], names[-1:])
-        said = f"{len(names)} forces: say which fingers are which side"
-    else:
-        said = ""
+    groups = _numbered_groups(names)
+    cells = all(len(group) >= _FEWEST_CELLS for group in groups)
+    groups = groups if cells else [[name] for name in names]
+    heads = [group[0] for group in groups]
+    sides = next((sides for pair in _SIDES if (sides := _sided(heads, pair)) is not None), None)
+    said = ""
+    if sides is None and len(heads) > 1:
+        sides = (heads[:-1], heads[-1:])
+        said = f"{heads[0]} is taken for the left side, {heads[1]} for the right"
+        if len(heads) > 2 or cells:
+            said = f"{len(heads)} {'groups of cells' if cells else 'forces'}: say which are which side"
     if sides is None:
-        yield _force(table, "force", names, "the sum of its numbers" if several else "")
-        return
-    for key, side in zip(("left", "right"), sides, strict=True):
-        yield _force(table, key, side, said)
-
-
-def _forces_of_cells(table: ColumnTable, cells: Mapping[str, Sequence[str]]) -> Iterator[Guess]:
-    """Yield the forces of sensors with many cells, each a group of columns, and the channels that keep them."""
-    names = [name for names in cells.values() for name in names]
-    unit = _force(table, "force", names, "").value.rpartition(" ")[2]
-    patterns = [f"'{pattern}'" for pattern in cells]
-    said = f"{len(cells)} groups of cells: say which are which side"
-    if len(patterns) == 1:
-        yield Guess(key="force", value=f"mean({patterns[0]}) {unit}", check="the mean of its cells")
-    else:
-        yield Guess(key="left", value=f"mean({', '.join(patterns[:-1])}) {unit}", check=said)
-        yield Guess(key="right", value=f"mean({patterns[-1]}) {unit}", check=said)
-    named = ", ".join(f'{_channel_name(pattern)} = "{pattern} {unit}"' for pattern in patterns)
-    yield Guess(key="channels", value=f"{{ {named} }}", check="the names of the groups")
+        array = table.numbers[names[0]].ndim == 2
+        said = "the mean of its cells" if cells else "the sum of its numbers" if array else ""
+    for key, side in zip(("left", "right"), sides, strict=True) if sides else [("force", heads)]:
+        yield _force(table, key, [group for group in groups if group[0] in side], said)
 
 
 def _sided(names: Sequence[str], pair: tuple[str, str]) -> tuple[Sequence[str], Sequence[str]] | None:
@@ -266,7 +291,9 @@ def _sided(names: Sequence[str], pair: tuple[str, str]) -> tuple[Sequence[str], 
     return (left, right) if left and right and len(left) + len(right) == len(names) else None
 
 
-def _force(table: ColumnTable, key: str, names: Sequence[str], said: str) -> Guess:
+def _force(table: ColumnTable, key: str, groups: Sequence[Sequence[str]], said: str) -> Guess:
+    """Return the force of single columns, or of groups of cells."""
+    names = [name for group in groups for name in group]
     unit, checks = _stated(table, names[0], "force"), [said] if said else []
     values = np.concatenate([table.numbers[name].reshape(-1) for name in names])
     if not unit:
@@ -275,12 +302,11 @@ def _force(table: ColumnTable, key: str, names: Sequence[str], said: str) -> Gue
         checks.append("whole numbers are taken for counts" if unit == "counts" else "no unit is stated")
     elif unit == "gf":
         checks.append("a mass is taken for gram-force")
-    several = len(names) > 1 or table.numbers[names[0]].ndim == 2
-    inside = ", ".join(map(quoted, names))
-    fold = "sum" if table.numbers[names[0]].ndim == 2 else "max"
-    return Guess(
-        key=key, value=f"{f'{fold}({inside})' if several else inside} [{unit}]", check="; ".join(checks)
-    )
+    array = table.numbers[names[0]].ndim == 2
+    inside = ", ".join(name for group in groups for name in _together(table, group))
+    fold = "sum" if array else "max" if len(groups[0]) == 1 else "mean"
+    value = f"{fold}({inside})" if array or len(names) > 1 else inside
+    return Guess(key=key, value=f"{value} [{unit}]", check="; ".join(checks))
 
 
 def _mean(table: ColumnTable, names: Sequence[str]) -> Numbers | None:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
+from keyword import iskeyword
 from typing import Any, Final
 
 import numpy as np
@@ -13,7 +15,7 @@ from numpy.typing import NDArray
 from graspsense.core.values.channel import Channel, FastChannel, TactileArray
 from graspsense.core.values.errors import DataDamaged, counted
 from graspsense.core.values.fingers import FingerForce, opposed_forces
-from graspsense.core.values.signals import NO_PADS, Frame, GraspEvent, Phase, Reading
+from graspsense.core.values.signals import CHANNELS, NO_PADS, Frame, GraspEvent, Phase, Reading
 from graspsense.recording.replayable import Recording
 from graspsense.sources.columns.fast_samples import most_in_a_tick, signals_in_ticks, values_in_ticks
 from graspsense.sources.formats.table import Numbers
@@ -125,6 +127,12 @@ class GraspColumns:
                 rows = (time_s >= t_s[0]) & (time_s <= t_s[-1]) if len(t_s) else np.zeros(len(time_s), bool)
             chosen[name] = values[rows]
         return chosen
+
+
+def is_channel_name(name: str) -> bool:
+    """Return whether a further channel can have this name, which no channel of every gripper has."""
+    plain = re.fullmatch(r"[a-z][a-z0-9_]*", name) is not None
+    return plain and not iskeyword(name) and name not in (*CHANNELS, "force", "t")
 
 
 def finger_sides(fingers: Sequence[FingerForce], forces: Mapping[str, Numbers]) -> tuple[Numbers, Numbers]:

@@ -9,10 +9,9 @@ from typing import Any, Final
 import numpy as np
 from attrs import frozen
 
-from graspsense.core.components.channels import dtype_of, further
-from graspsense.core.values.channel import FLOATS
-from graspsense.core.values.signals import CHANNEL_OF_FIELD, Image, Samples
-from graspsense.core.values.trace import SI_UNITS
+from graspsense.core.components.channels import further
+from graspsense.core.values.signals import CHANNEL_OF_FIELD
+from graspsense.core.values.trace import SI_UNITS, ImageTrace, signals_of
 from graspsense.recording.labelled_recording import LabelledRecording
 from graspsense.recording.replayable import Recording
 from graspsense.sources.columns.channel_facts import ChannelFacts, channel_facts, together
@@ -89,30 +88,23 @@ def _measured(recordings: Sequence[Recording]) -> tuple[ChannelFacts, ...]:
             **recording.units,
             **{channel.name: channel.unit for channel in recording.channels},
         }
-        (t_s,) = recording.columns("t_s")
-        for name, values, new in _series(recording):
-            facts = channel_facts(name, units.get(name, "1"), values, t_s[new])
-            parts.setdefault(name, []).append(facts)
+        for name, values, t_s in _series(recording):
+            parts.setdefault(name, []).append(channel_facts(name, units.get(name, "1"), values, t_s))
     return tuple(map(together, parts.values()))
 
 
-def _series(recording: Recording) -> Iterator[tuple[str, Numbers, Any]]:
-    """Yield the values of each channel that the recording has, and their ticks: of the frame, numbers, and images."""
-    every = slice(None)
-    for name, values in zip(CHANNEL_OF.values(), recording.columns(*CHANNEL_OF), strict=True):
+def _series(recording: Recording) -> Iterator[tuple[str, Numbers, Numbers]]:
+    """Yield the values of each channel that the recording has, with their times: of the frame, numbers, and images."""
+    t_s, *fields = recording.columns("t_s", *CHANNEL_OF)
+    for name, values in zip(CHANNEL_OF.values(), fields, strict=True):
         if np.isfinite(values).any():
-            yield name, values, every
-    for channel in further(recording.channels):
-        values = [getattr(reading.signals, channel.name) for reading in recording.readings]
-        if isinstance(values[0], Image) and dtype_of(values[0]) != FLOATS:
-            counters = np.array([0, *(value.counter for value in values)])
-            new = np.flatnonzero(np.diff(counters))
-            if len(new):
-                yield channel.name, np.array([values[k].cells for k in new]), new
-        elif isinstance(values[0], Image):
-            yield channel.name, np.array([value.cells for value in values], dtype=np.float64), every
-        elif not isinstance(values[0], Samples):
-            yield channel.name, np.array(values, dtype=np.float64), every
+            yield name, values, t_s
+    for name, signal in signals_of([reading.signals for reading in recording.readings]).items():
+        if isinstance(signal, ImageTrace):
+            if len(signal.t_s):
+                yield name, np.asarray(signal.cells), signal.t_s
+        elif isinstance(signal, np.ndarray):
+            yield name, signal, t_s
 
 
 def _label(label: str, recordings: Sequence[LabelledRecording]) -> LabelSummary:

@@ -48,13 +48,13 @@ def without_number(t_s: Numbers, gap: Numbers, force: Numbers) -> Iterator[str]:
 
 
 def without_rise(columns: GraspColumns, squeezes: Sequence[tuple[int, int]]) -> Iterator[str]:
-    """Yield a sentence if the force does not rise in a closing; `squeezes` are the samples in which it does."""
+    """Yield a sentence if the force does not rise in a closing, or hardly; `squeezes` are those in which it does."""
     missed = [
         begin
         for begin, end in closings(columns.gap_m)
         if not any(rise < end and fall > begin for rise, fall in squeezes)
     ]
-    asked = "was nothing between them, or did the force fail?"
+    asked = "was nothing between them, did the force fail, or was it less than a tenth of the usual one?"
     yield from _told(columns.t_s, missed, "without a squeeze", asked)
 
 

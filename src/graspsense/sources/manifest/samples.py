@@ -6,17 +6,21 @@ import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
-from keyword import iskeyword
 from typing import Final
 
 import numpy as np
 
 from graspsense.core.values.errors import ConfigError, DataDamaged, counted, listed
 from graspsense.core.values.fingers import PREFIX, FingerForce
-from graspsense.core.values.signals import CHANNELS, NO_GAP
+from graspsense.core.values.signals import NO_GAP
 from graspsense.sources.columns.column_guess import unit_in_name
 from graspsense.sources.columns.force_and_gap import doubtful_delay
-from graspsense.sources.columns.grasp_columns import GraspColumns, finger_sides, without_missing
+from graspsense.sources.columns.grasp_columns import (
+    GraspColumns,
+    finger_sides,
+    is_channel_name,
+    without_missing,
+)
 from graspsense.sources.formats.table import ColumnTable, Numbers
 from graspsense.sources.manifest.available import AvailableColumns
 from graspsense.sources.manifest.closings import without_number
@@ -32,8 +36,6 @@ MOSTLY: Final = 0.5
 """Share of the samples with gap and force from which on these were measured together."""
 QUANTITIES: Final = ("time", "gap", "force")
 """The quantities whose units are not those of another one."""
-_NAME: Final = re.compile(r"[a-z][a-z0-9_]*")
-_TAKEN: Final = frozenset({*CHANNELS, "force", "t"})
 
 
 @np.errstate(all="ignore")  # what is infinite, or too large, is refused by `checked_recording`
@@ -290,7 +292,7 @@ def _channels(columns: AvailableColumns) -> tuple[dict[str, Numbers], dict[str, 
     arrays: dict[str, Numbers] = {}
     units: dict[str, str] = {}
     for name, expression in manifest.channels.items():
-        if not _NAME.fullmatch(name) or iskeyword(name) or name in _TAKEN:
+        if not is_channel_name(name):
             raise ConfigError(
                 f"{manifest.place}: channels: {name!r} cannot be the name of a channel: write small letters, digits "
                 "and underscores, a letter first, and no name of a channel of every gripper"

@@ -11,7 +11,7 @@ import numpy as np
 from attrs import evolve
 
 from graspsense.core.grasp.gap_resolution import gap_resolution
-from graspsense.core.values.errors import DataDamaged, counted
+from graspsense.core.values.errors import DataDamaged
 from graspsense.core.values.limits import SAMPLES
 from graspsense.sources.columns.grasp_columns import (
     NAMES,
@@ -64,7 +64,7 @@ def squeezes(columns: GraspColumns) -> list[GraspColumns]:
     it is, as after a change of its zero.
     """
     force = _known_force(columns)
-    runs = _of_one_closing(columns.gap_m, _held_runs(force, np.diff(columns.t_s)))
+    runs = _of_one_closing(columns.gap_m, held_runs(force, np.diff(columns.t_s)))
     runs = list(_divided(columns, force, runs))
     if not runs:
         raise DataDamaged(f"{columns.source}: no squeeze was found, because its force never rises")
@@ -80,16 +80,7 @@ def squeezes(columns: GraspColumns) -> list[GraspColumns]:
                 "comes back: did its sensor fail for a moment? Then both parts are of one squeeze: split by a column"
             )
             parts[k] = evolve(parts[k], warnings=(*parts[k].warnings, told))
-    weak = _weak_runs(columns, force, runs)
-    missed = [*without_rise(columns, [*runs, *weak])]
-    if weak:
-        strongest = max(float(np.ptp(force[begin - 1 : end])) for begin, end in weak)
-        unit = columns.units.get("force") or "N"
-        missed.append(
-            f"{counted(len(weak), 'rise')} of the force by at most {strongest:.2g} {unit} (the first at "
-            f"{columns.t_s[weak[0][0]]:.4g} s) is taken for no squeeze: less than {100 * WEAKEST:.0f} % of the usual "
-            "force. If fingers closed then, split by a column"
-        )
+    missed = without_rise(columns, runs)
     parts[0] = evolve(parts[0], warnings=(*parts[0].warnings, *missed))
     return [_measured(part) for part in parts]
 
@@ -99,23 +90,6 @@ def _measured(columns: GraspColumns) -> GraspColumns:
     known = ~np.isnan(columns.gap_m + columns.force_n)
     place = columns.place(int(known.argmin()))
     return columns if known.all() or not known.any() else only(columns, known, f"without a number ({place})")
-
-
-def _weak_runs(columns: GraspColumns, force: Numbers, runs: list[tuple[int, int]]) -> list[tuple[int, int]]:
-    """Return where the force rises by less than a squeeze and comes back, while the fingers are closed."""
-    held = np.zeros(len(force), dtype=bool)
-    for begin, end in runs:
-        held[begin:end] = True
-    gap = columns.gap_m
-    half_closed = 0.5 * (float(np.nanmax(gap, initial=0.0)) + float(np.nanmin(gap[held], initial=np.inf)))
-    return [
-        (begin, end)
-        for begin, end in _held_runs(force, np.diff(columns.t_s), UNLOADED)
-        if begin > 0
-        and end < len(force)
-        and not held[begin:end].any()
-        and gap[begin:end].mean() < half_closed
-    ]
 
 
 def _of_one_closing(gap: Numbers, runs: list[tuple[int, int]]) -> list[tuple[int, int]]:
@@ -128,9 +102,9 @@ def _of_one_closing(gap: Numbers, runs: list[tuple[int, int]]) -> list[tuple[int
             start, earlier = joined[-1]
             between, narrowest = gap[earlier - 1 : begin + 1], np.nanmin(gap[start:earlier], initial=np.inf)
             closes = between[0] - between[-1] > least and np.nanmax(between) < between[0] + least
-            if (
-                closes and between[0] < narrowest + least
-            ):  # in a squeeze with a force that stuck, they had opened
+            # In a squeeze with a force that stuck they had opened, and a gap that stopped shows no closing.
+            stopped = not np.ptp(gap[start:earlier]) > 0.0
+            if closes and between[0] < narrowest + least and not stopped:
                 begin = joined.pop()[0]
         joined.append((begin, end))
     return joined
@@ -169,7 +143,7 @@ def _middle(t_s: Numbers, end: int, begin: int) -> int:
     return end + int(back[0]) if len(back) else (end + begin) // 2
 
 
-def _held_runs(force: Numbers, steps_s: Numbers, weakest: float = WEAKEST) -> list[tuple[int, int]]:
+def held_runs(force: Numbers, steps_s: Numbers) -> list[tuple[int, int]]:
     """Return the first sample of each squeeze and the one after its last."""
     noise = NOISE * float(np.median(np.abs(np.diff(force, 2)))) if len(force) > 2 else 0.0
     around = np.pad(force, FEWEST - 1, mode="edge")
@@ -180,7 +154,7 @@ def _held_runs(force: Numbers, steps_s: Numbers, weakest: float = WEAKEST) -> li
     force = np.where(force < low - BELOW * (high - low), low, force)
     loaded = force[force > low + max(noise, UNLOADED * (high - low))]
     usual = float(np.median(loaded)) - float(low) if len(loaded) else float(high - low)
-    rise = max(noise, weakest * usual)
+    rise = max(noise, WEAKEST * usual)
     usual_s = float(np.median(steps_s)) if len(steps_s) else 0.0
     shortest = SHORTEST_RELEASE_S / usual_s if usual_s else 0.0  # stamps with few digits are alike
     joined: list[tuple[int, int]] = []

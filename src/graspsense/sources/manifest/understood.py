@@ -8,13 +8,11 @@ from pathlib import Path
 import numpy as np
 from attrs import frozen
 
-from graspsense.core.values.errors import DataDamaged
 from graspsense.sources.columns.channel_facts import ChannelFacts, channel_facts
 from graspsense.sources.columns.column_guess import force_columns, guesses, time_column
-from graspsense.sources.columns.grasp_columns import GraspColumns
 from graspsense.sources.formats.raw_tables import raw_tables
 from graspsense.sources.formats.table import ColumnTable, Numbers
-from graspsense.sources.manifest.steps import squeezes
+from graspsense.sources.manifest.steps import held_runs
 from graspsense.sources.units import TO_SI, unit_since_1970
 
 
@@ -88,18 +86,6 @@ def _squeezes(
         force = np.sum(parts, axis=0)
         known = np.isfinite(force)  # a topic that was written to one table with others has rows of its own
         t_s, force = t_s[known], force[known]
-        columns = GraspColumns(source=table.source, t_s=t_s, gap_m=-force, left_n=force, right_n=force)
-        if len(t_s) < 2:
-            return names[0], ()
-        try:
-            spans = squeezes(columns)
-        except DataDamaged:
-            return names[0], ()
-        return ", ".join(names), tuple(_held(squeeze) for squeeze in spans)
+        runs = held_runs(force, np.diff(t_s)) if len(t_s) > 1 else []
+        return ", ".join(names), tuple((float(t_s[begin]), float(t_s[end - 1])) for begin, end in runs)
     return "", ()
-
-
-def _held(columns: GraspColumns) -> tuple[float, float]:
-    force = columns.force_n
-    held = columns.t_s[force > float(force.min()) + 0.2 * float(np.ptp(force))]
-    return float(held[0]), float(held[-1])

@@ -21,6 +21,7 @@ GripperAccelerometer). In ROS a positive effort opens the gripper; here it squee
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
 
@@ -284,13 +285,11 @@ def _with_acceleration(
     """
     sampled_s: list[float] = []
     values: list[tuple[float, float, float]] = []
-    before_ns: int | None = None
-    for t_ns, rows in messages:
-        if before_ns is not None and before_ns >= began_ns:
+    for (before_ns, _), (t_ns, rows) in pairwise(messages):
+        if before_ns >= began_ns:
             step_ns = (t_ns - before_ns) / max(len(rows), 1)
             sampled_s += [(before_ns - began_ns + step_ns * k) * 1e-9 for k in range(1, len(rows) + 1)]
             values += rows
-        before_ns = t_ns
     times = np.array([reading.frame.t_s for reading in readings])
     most = most_in_a_tick(times, sampled_s)
     if most == 0:
