@@ -14,7 +14,7 @@ from graspsense.core.grasp.protection.drift import Drift, PadDrift
 from graspsense.core.grasp.protection.effort_ceiling import effort_ceiling_n, limited
 from graspsense.core.grasp.protection.motor import FeltForce, FreeEffort, Motor
 from graspsense.core.grasp.protection.pad_forces import EmptyHold, StuckForce
-from graspsense.core.grasp.protection.reports import Reports, StatusWatch
+from graspsense.core.grasp.protection.reports import PADS_ABSENT, Absence, Reports, StatusWatch
 from graspsense.core.grasp.protection.speed import GapSpeed, Standstill
 from graspsense.core.grasp.protection.touch import Touch
 from graspsense.core.values.device import DeviceInfo
@@ -479,10 +479,11 @@ def test_a_slow_approach_may_push_an_object_as_far(speed):
 
 def test_forces_that_become_no_number_end_the_grasp_and_each_pad_is_named():
     approach = Approach({}, HELD)
-    for now in course(0.102, gap=approach.gap, velocity=0.0, left=nan, right=nan):
+    absences = [Absence(fault, 24.0, expected=True) for fault in PADS_ABSENT]
+    for now in course(0.127, gap=approach.gap, velocity=0.0, left=nan, right=nan):
         now = now._replace(t_s=now.t_s + approach.t)
         assert approach.touch.see(now, SQUEEZE, CLOSING) is None
-        faults = approach.touch.absent(now)
+        faults = [absence.see(nan, now) for absence in absences]
     assert names_of(faults) == {("left pad absent", True), ("right pad absent", True)}
 
 

@@ -7,7 +7,7 @@ from typing import Final
 
 from graspsense.core.grasp.protection.motor import RecentMean, lasting
 from graspsense.core.values.faults import Fault
-from graspsense.core.values.signals import Frame, Phase
+from graspsense.core.values.signals import CLOSING, Frame, Phase
 
 MEAN_S: Final = 0.1
 """Time over which the forces are averaged, and after which they are compared."""
@@ -25,6 +25,11 @@ SCALED_SHARE: Final = 0.2
 force: features of their mean are then 10 % off. Real pads are not calibrated better."""
 LIGHT_SHARE: Final = 0.5
 """Share of the force below which both pads tell what friction held before: a wrong scale differs by less then."""
+FRICTION_N: Final = 1.5
+"""Difference that friction can hold while the force changes: of half a kilogram on a table."""
+APART_SHARE: Final = 0.3
+FEWEST_APART: Final = 3
+"""Share of the greatest force by which the pads may differ besides, in so many samples in a row."""
 STILL_S: Final = 0.25
 """Least time for which the force of a pad stands still."""
 RESTS_M: Final = 0.0003
@@ -41,7 +46,7 @@ EMPTY_S: Final = 0.1
 
 
 class PadBalance:
-    """Compares the forces of both pads while the fingers hold.
+    """Compares the forces of both pads while they press: at rest, and while the force rises or falls.
 
     Friction holds an object that one finger has pushed, so that this finger feels more throughout; a wrong scale lets
     the difference grow with the force.
@@ -49,41 +54,66 @@ class PadBalance:
 
     def __init__(self, contact_n: float) -> None:
         self._left, self._right = RecentMean(MEAN_S), RecentMean(MEAN_S)
-        self._seen_s = 0.0
+        self._held_s = 0.0
         self._scaled_n, self._free_n = SCALED_CONTACTS * contact_n, FREE_SHARE * contact_n
-        self._pushed_n = 0.0
-        """What the left pad felt more than the right one before both touched (N)."""
-        self._light_n, self._held_n = inf, 0.0
+        self._pushed_n = self._pressed_n = 0.0
+        """What the left pad felt more than the right one before both touched, and the greatest force of both (N)."""
+        self._light_n, self._light_more_n = inf, 0.0
         """The least force since both touched, and what the left pad felt more than the right one then (N)."""
+        self._apart_samples = 0
 
-    def see(self, frame: Frame, phase: int) -> Fault | None:
-        """Take the frame of a tick while the fingers close or hold; return what no friction or calibration explains."""
-        if phase == Phase.APPROACH and min(frame.force_left_n, frame.force_right_n) < self._free_n:
-            more_n = frame.force_left_n - frame.force_right_n
+    @property
+    def ended(self) -> bool:
+        """Whether the fingers have held for so long that the pads are not compared until they open."""
+        return self._held_s > HELD_S
+
+    def see(self, frame: Frame, phase: int, *, new: bool) -> Fault | None:
+        """Take the frame of a tick, with new forces or not; return what no friction or calibration explains."""
+        forces = (frame.force_left_n, frame.force_right_n)
+        more_n, greatest_n = forces[0] - forces[1], max(forces)
+        if phase == Phase.APPROACH and min(forces) < self._free_n:
             self._pushed_n = more_n if more_n == more_n else self._pushed_n
-        elif self._free_n <= max(frame.force_left_n, frame.force_right_n) < self._light_n:
-            self._light_n = max(frame.force_left_n, frame.force_right_n)
-            self._held_n = frame.force_left_n - frame.force_right_n
-        if phase != Phase.HOLD:
+        elif phase in CLOSING and self._free_n <= greatest_n < self._light_n:
+            self._light_n, self._light_more_n = greatest_n, more_n
+        self._held_s = self._held_s + frame.dt_s if phase == Phase.HOLD else 0.0
+        if self.ended:
             return None
+        at_rest = self._at_rest(frame) if phase == Phase.HOLD else None
+        return at_rest or (self._changing(forces, phase) if new else None)
+
+    def _at_rest(self, frame: Frame) -> Fault | None:
+        """Return the fault of pads that differ in the hold, in the mean of some time."""
         self._left.add(frame.force_left_n, frame.dt_s)
         self._right.add(frame.force_right_n, frame.dt_s)
-        self._seen_s += frame.dt_s
         forces = {"left": self._left.value, "right": self._right.value}
         weak, strong = sorted(forces, key=lambda side: forces[side])
         difference_n = forces[strong] - forces[weak]
         light = self._light_n < LIGHT_SHARE * forces[strong]
-        before_n = self._held_n if light else self._pushed_n
+        before_n = self._light_more_n if light else self._pushed_n
         grown_n = difference_n - (before_n if strong == "left" else -before_n)
         far = difference_n > max(ALLOWED_N, ALLOWED_SHARE * forces[strong])
         scaled = min(difference_n, grown_n) > max(self._scaled_n, SCALED_SHARE * forces[strong])
-        if not MEAN_S <= self._seen_s <= HELD_S or not (far or scaled):
+        if self._held_s < MEAN_S or not (far or scaled):
             return None
         return Fault(
             "pads disagree",
             f"at rest the {weak} pad feels {forces[weak]:.1f} N and the {strong} one {forces[strong]:.1f} N, though "
             f"both hold the same object, and {100.0 * SCALED_SHARE:.0f} % are allowed: one has another scale, or lost "
             "its zero; check the cells of both, and calibrate them (graspsense calibrate)",
+        )
+
+    def _changing(self, forces: tuple[float, float], phase: int) -> Fault | None:
+        """Return the fault of pads that differ by more than friction holds in several samples in a row."""
+        self._pressed_n = max(self._pressed_n, *forces)
+        more_n = abs(forces[0] - forces[1] - self._pushed_n)
+        apart = phase > Phase.APPROACH and more_n > max(FRICTION_N, APART_SHARE * self._pressed_n)
+        self._apart_samples = self._apart_samples + 1 if apart else 0
+        if self._apart_samples < FEWEST_APART:
+            return None
+        return Fault(
+            "pads disagree",
+            f"while the force changes, the left pad feels {forces[0]:.1f} N and the right one {forces[1]:.1f} N, "
+            "though both touch one object: one is late, has another scale, or lost its zero; check both fingertips",
         )
 
 

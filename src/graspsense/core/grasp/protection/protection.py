@@ -23,10 +23,11 @@ from graspsense.core.grasp.protection.effort_ceiling import asked_effort_n, effo
 from graspsense.core.grasp.protection.motor import REVERSED, FeltForce, FreeEffort, Motor
 from graspsense.core.grasp.protection.opening import Opening
 from graspsense.core.grasp.protection.pad_curves import PadCurves
-from graspsense.core.grasp.protection.pad_forces import EmptyHold, PadBalance, StuckForce
+from graspsense.core.grasp.protection.pad_forces import EmptyHold, StuckForce
 from graspsense.core.grasp.protection.reports import (
     EFFORT_ABSENT,
     GAP_ABSENT,
+    PADS_ABSENT,
     Absence,
     Repeats,
     Reports,
@@ -92,7 +93,7 @@ class Protection:
         pads_hz = min(rates.get("force_left", 0.0), rates.get("force_right", 0.0))
         self._drift = Drift(contact_n)
         self._touch = Touch(contact_n, run.first_effort_n, pads_hz, self._drift.on_some_cells)
-        self._stuck, self._balance = StuckForce(pads_hz), PadBalance(contact_n)
+        self._stuck = StuckForce(pads_hz)
         self._curves, self._empty_hold = PadCurves(contact_n, pads_hz), EmptyHold(contact_n)
         self._felt, self._gap_speed = (
             FeltForce(info.rate_hz, pads_hz, info.friction_n),
@@ -104,6 +105,7 @@ class Protection:
         self._effort = ReportedEffort() if "effort" in rates else None
         self._effort_absence = Absence(EFFORT_ABSENT, info.rate_hz, expected="effort" in rates)
         self._gap_absence = Absence(GAP_ABSENT, info.rate_hz, expected="gap" in rates)
+        self._pad_absences = [Absence(fault, pads_hz or inf, expected=True) for fault in PADS_ABSENT]
         self._status = StatusWatch(info.status_bits)
         first_m_s = run.first_speed_m_s if info.clock == "device" else inf
         self._standstill, self._jump = Standstill(), GapJump(info.speed_limit_m_s)
@@ -113,7 +115,13 @@ class Protection:
             # What the guard leaves of it, where no pad has felt anything.
             opening = opening._replace(speed_limit_m_s=min(opening.speed_limit_m_s, first_m_s))
         self.opening = Opening(
-            info.rate_hz, command_delay_s, opening, "gap" in rates, info.friction_n, info.open_gap_m
+            info.rate_hz,
+            command_delay_s,
+            opening,
+            "gap" in rates,
+            info.friction_n,
+            info.open_gap_m,
+            contact_n,
         )
         self._rush = Rush(min(first_m_s, info.speed_limit_m_s), info.rate_hz)
         self._reports = Reports(info.rate_hz, rates.get("pads", 0.0))
@@ -231,10 +239,11 @@ class Protection:
         frame = reading.frame
         closing = phase in CLOSING
         if closing:
-            for fault in self._touch.absent(frame):
-                self._see(fault)
+            for absence, force_n in zip(
+                self._pad_absences, (frame.force_left_n, frame.force_right_n), strict=True
+            ):
+                self._see(absence.see(force_n, frame))
             self._see(self._felt.see(frame))
-            self._see(self._balance.see(frame, phase))
         for fault in self._curves.see(reading, phase):
             self._see(fault, phase)
         free = self._touch.free()

@@ -53,10 +53,7 @@ IMAGES_LATE_S: Final = 0.1
 
 
 ABSENT_S: Final = 0.1
-"""Time for which a measurement may be no number; at least three frames."""
-AGAIN: Final = 5
-AGAIN_SHARE: Final = 0.02
-"""Frames without a number, and their share, from which on they are told."""
+"""Time for which a measurement may be no number, without a break or in all; at least three periods."""
 GAP_ABSENT: Final = Fault(
     "gap absent",
     "it is no number any more, or below zero: check the encoder and the sign of the gap",
@@ -65,6 +62,10 @@ GAP_ABSENT: Final = Fault(
 EFFORT_ABSENT: Final = Fault(
     "effort absent",
     "the gripper does not tell its effort, so what follows from it is missing: check its current or load sensor",
+)
+PADS_ABSENT: Final = tuple(
+    Fault(f"{side} pad absent", "it gives no force: check the fingertip and its cable", ends=True)
+    for side in ("left", "right")
 )
 
 
@@ -253,7 +254,7 @@ class StatusWatch:
 
 
 class Absence:
-    """Watches one measurement of frames with this rate (Hz), whose absence is this fault. Infinity is absence too.
+    """Watches one measurement with this rate (Hz), whose absence is this fault. Infinity is absence too.
 
     One that is not `expected` is missed only after it was there.
     """
@@ -261,8 +262,7 @@ class Absence:
     def __init__(self, fault: Fault, rate_hz: float, *, expected: bool) -> None:
         self._fault, self._expected = fault, expected
         self._allowed_s = max(ABSENT_S, 3.0 / rate_hz)
-        self._known_s = nan
-        self._frames = self._absent = 0
+        self._absent_s = self._all_absent_s = 0.0
 
     def see(self, value: float, frame: Frame) -> Fault | None:
         """Take the value of the measurement in this frame; return the fault once it has been no number for too long.
@@ -270,17 +270,16 @@ class Absence:
         One that is no number again and again has the fault too, which then does not end the grasp.
         """
         is_known = isfinite(value)
-        if is_known or (self._expected and self._known_s != self._known_s):
-            self._known_s = frame.t_s
-        if frame.t_s - self._known_s > self._allowed_s:
+        self._expected = self._expected or is_known
+        missing_s = 0.0 if is_known or not self._expected else frame.dt_s
+        self._all_absent_s += missing_s
+        self._absent_s = self._absent_s + missing_s if not is_known else 0.0
+        if self._absent_s > self._allowed_s:
             return self._fault
-        if self._known_s == self._known_s:
-            self._frames += 1
-            self._absent += not is_known
-        if is_known or self._absent < max(AGAIN, AGAIN_SHARE * self._frames):
+        if is_known or self._all_absent_s <= self._allowed_s:
             return None
         return Fault(
             self._fault.name,
-            f"{self._absent} of {self._frames} frames do not tell it, so that what follows from it is wrong or "
+            f"it was no number for {self._all_absent_s:.2f} s in all, so that what follows from it is wrong or "
             "missing: check its sensor and the connection",
         )
