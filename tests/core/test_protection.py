@@ -341,16 +341,6 @@ def test_a_clock_or_images_that_stand_still_end_the_grasp():
     assert first_end(images_stop, SQUEEZE, 25.0)[1] == pytest.approx(160 + 200, abs=2)
 
 
-def test_lost_frames_are_told_with_their_share_and_end_the_grasp_from_one_half_on():
-    # Two of three frames come, then one of three; frames that only come unevenly are not lost.
-    faults, end = first_end([reading(0.0015 * k, dt=0.001 + 0.001 * (k % 2)) for k in range(400)], APPROACH)
-    assert end is None
-    assert "33 %" in faults[-1].words
-    assert first_end([reading(0.003 * k, dt=0.003) for k in range(400)], APPROACH)[1] is not None
-    uneven = [reading(0.001 * k, dt=0.0005 + 0.001 * (k % 2)) for k in range(1000)]
-    assert first_end(uneven, APPROACH) == ([None] * 1000, None)
-
-
 @every_case(
     ("sound_ticks", "rate", "told"),
     # In the last case 10 % slow from the contact on, after a sound approach of three seconds.

@@ -20,6 +20,7 @@ from graspsense.core.grasp.protection.cells import Fingertips
 from graspsense.core.grasp.protection.drift import Drift
 from graspsense.core.grasp.protection.effort import ReportedEffort
 from graspsense.core.grasp.protection.effort_ceiling import asked_effort_n, effort_ceiling_n, limited
+from graspsense.core.grasp.protection.losses import FRAMES_LOST, Losses
 from graspsense.core.grasp.protection.motor import REVERSED, FeltForce, FreeEffort, Motor
 from graspsense.core.grasp.protection.opening import Opening
 from graspsense.core.grasp.protection.pad_curves import PadCurves
@@ -124,12 +125,18 @@ class Protection:
             contact_n,
         )
         self._rush = Rush(min(first_m_s, info.speed_limit_m_s), info.rate_hz)
-        self._reports = Reports(info.rate_hz, rates.get("pads", 0.0))
+        self._reports, self.losses = Reports(info.rate_hz, rates.get("pads", 0.0)), Losses(info.rate_hz)
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """The faults that were seen and do not follow from others, each in a sentence."""
-        return tuple(self._told[name].told for name in causes(self._told))
+        lost = f"; {self.losses.in_words()}"
+        return tuple(self._told[name].told + lost * (name == FRAMES_LOST) for name in causes(self._told))
+
+    @property
+    def lost(self) -> str:
+        """What was lost, in words, if no warning tells it."""
+        return "" if FRAMES_LOST in self._told else self.losses.in_words()
 
     def cause_of(self, fault: Fault) -> Fault:
         """Return the fault from which this one follows, or this one itself."""
@@ -161,7 +168,10 @@ class Protection:
         wrong way ends it: the grasp is over, and its outcome stays.
         """
         frame = reading.frame
-        self._see(self._reports.see(reading, phase), phase)
+        reported = self._reports.see(reading, phase)
+        self._see(reported, phase)
+        if phase >= APPROACH:
+            self._see(self.losses.see(reading, phase, jumped=reported is not None), phase)
         for fault in self._status.see(frame, phase):
             self._see(fault, phase)
         jump = self._jump.see(frame)
