@@ -34,7 +34,7 @@ from graspsense.core.grasp.protection.reports import (
     Reports,
     StatusWatch,
 )
-from graspsense.core.grasp.protection.speed import GapJump, GapSpeed, KeptSpeed, Rush, Standstill
+from graspsense.core.grasp.protection.speed import GapJump, GapSpeed, KeptSpeed, Standstill
 from graspsense.core.grasp.protection.touch import CLOSED_M, Touch
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.faults import LIMITED, Fault
@@ -110,7 +110,8 @@ class Protection:
         self._status = StatusWatch(info.status_bits)
         first_m_s = run.first_speed_m_s if info.clock == "device" else inf
         self._standstill, self._jump = Standstill(), GapJump(info.speed_limit_m_s)
-        self._kept_speed, self._repeats = KeptSpeed(info.rate_hz), Repeats()
+        self._kept_speed = KeptSpeed(info.rate_hz, min(first_m_s, info.speed_limit_m_s))
+        self._repeats = Repeats()
         opening = info.opening
         if opening is not None:
             # What the guard leaves of it, where no pad has felt anything.
@@ -124,7 +125,6 @@ class Protection:
             info.open_gap_m,
             contact_n,
         )
-        self._rush = Rush(min(first_m_s, info.speed_limit_m_s), info.rate_hz)
         self._reports, self.losses = Reports(info.rate_hz, rates.get("pads", 0.0)), Losses(info.rate_hz)
 
     @property
@@ -237,7 +237,6 @@ class Protection:
         """Take the frame of a tick in which the fingers may move freely, and the command that was applied to it."""
         if phase == APPROACH:
             if self._touch.free():
-                self._see(self._rush.see(frame))
                 self._see(self._repeats.see(frame, jumped=jumped))
                 self._see(self._kept_speed.see(frame, phase))
                 self._see(self._free_effort.see(frame, applied))
