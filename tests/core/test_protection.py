@@ -459,12 +459,25 @@ def test_noise_and_objects_are_no_drift(force, more):
 # ------------------------------------------------------------------------------- grippers of other rates and channels
 
 
-@every_case("speed", [0.001, 0.003])
-def test_a_slow_approach_may_push_an_object_as_far(speed):
-    # 14 mm of pushing, from gaps alone: this gripper has no velocity.
-    pushed = {"gap": lambda t: 0.09 - speed * t, "left": lambda t: float(t * speed > 0.002)}
-    frames = course(0.016 / speed, 0.01, velocity=nan, **pushed)
-    assert faults_of(Touch(CONTACT_N).see, frames, APPROACH, CLOSING) == []
+@every_case(
+    ("speed", "step_m", "measured"),
+    # From gaps alone: these grippers have no velocity. The last one has that over six gaps of a coarse encoder.
+    [(0.001, 1e-7, False), (0.003, 1e-7, False), (0.01, 0.000375, True)],
+)
+def test_a_slow_approach_and_one_with_a_coarse_gap_may_push_an_object_as_far(speed, step_m, measured):
+    """It is pushed over 14 mm."""
+
+    def gap_m(t):
+        return 0.09 - step_m * round(speed * max(t, 0.0) / step_m)
+
+    frames = course(
+        0.016 / speed,
+        0.01,
+        gap=gap_m,
+        velocity=(lambda t: (gap_m(t) - gap_m(t - 0.05)) / 0.05) if measured else nan,
+        left=lambda t: float(t * speed > 0.002),
+    )
+    assert faults_of(Touch(CONTACT_N, rate_hz=100.0).see, frames, APPROACH, CLOSING) == []
 
 
 def test_forces_that_become_no_number_end_the_grasp_and_each_pad_is_named():

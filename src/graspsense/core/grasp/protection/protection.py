@@ -93,7 +93,7 @@ class Protection:
         self._has_pads = "force_left" in rates and "force_right" in rates
         pads_hz = min(rates.get("force_left", 0.0), rates.get("force_right", 0.0))
         self._drift = Drift(contact_n)
-        self._touch = Touch(contact_n, run.first_effort_n, pads_hz, self._drift.on_some_cells)
+        self._touch = Touch(contact_n, run.first_effort_n, pads_hz, self._drift.on_some_cells, info.rate_hz)
         self._stuck = StuckForce(pads_hz)
         self._curves, self._empty_hold = PadCurves(contact_n, pads_hz), EmptyHold(contact_n)
         self._felt, self._gap_speed = (

@@ -58,7 +58,8 @@ SLOWED_SHARE: Final = 0.7
 SMOOTHING_S: Final = 0.2
 """Time constant of the means of effort and speed over the approach."""
 SPEED_SMOOTHING_S: Final = 0.01
-"""Time constant of the present speed, several steps of an encoder."""
+SPEED_PERIODS: Final = 10.0
+"""Time constant of the present speed, at least so many periods of the frames: several steps of an encoder."""
 NEEDED_MARGIN: Final = 1.25
 NEEDED_CONTACTS: Final = 2.0
 """By how much the effort may exceed the mean effort of the approach while a contact is not clear: by a quarter, and by
@@ -101,7 +102,7 @@ class Touch:
     """Watches both pads against the motion of the fingers, from the approach to the hold.
 
     `usual_effort_n` limits a contact that is not clear where the approach has shown no effort. `pads_hz` is the rate of
-    the forces of the pads, 0 if it is not known. `on_some_cells` returns whether both forces rose on some cells only.
+    the forces of the pads, 0 if it is not known, and `rate_hz` that of the frames. `on_some_cells` returns whether both forces rose on some cells only.
     """
 
     def __init__(
@@ -110,6 +111,7 @@ class Touch:
         usual_effort_n: float = inf,
         pads_hz: float = 0.0,
         on_some_cells: Callable[[], bool] = lambda: False,
+        rate_hz: float = inf,
     ) -> None:
         self._contact_n, self._usual_n = contact_force_n, usual_effort_n
         self._on_some_cells = on_some_cells
@@ -118,7 +120,7 @@ class Touch:
         self._ever_felt = False
         self._gap_m = nan
         self._needed_n, self._approach_m_s = RecentMean(SMOOTHING_S), RecentMean(SMOOTHING_S)
-        self._speed_m_s = RecentMean(SPEED_SMOOTHING_S)
+        self._speed_m_s = RecentMean(max(SPEED_SMOOTHING_S, SPEED_PERIODS / rate_hz))
         self._start_gap_m = nan
         self._alone_t_s = self._alone_gap_m = nan
         self._moved_t_s = self._moved_gap_m = nan
