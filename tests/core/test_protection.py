@@ -1,5 +1,6 @@
 """The protection of a grasp: what a healthy gripper may do, and each fault that warns or ends the grasp."""
 
+from functools import partial
 from math import inf, nan
 
 import numpy as np
@@ -13,7 +14,7 @@ from graspsense.core.grasp.protection.cells import Fingertips
 from graspsense.core.grasp.protection.drift import Drift, PadDrift
 from graspsense.core.grasp.protection.effort_ceiling import effort_ceiling_n, limited
 from graspsense.core.grasp.protection.motor import FeltForce, FreeEffort, Motor
-from graspsense.core.grasp.protection.pad_forces import EmptyHold, StuckForce
+from graspsense.core.grasp.protection.pad_forces import PadBalance
 from graspsense.core.grasp.protection.reports import PADS_ABSENT, Absence, Reports, StatusWatch
 from graspsense.core.grasp.protection.speed import GapSpeed, Standstill
 from graspsense.core.grasp.protection.touch import Touch
@@ -391,10 +392,10 @@ def test_a_fingertip_that_goes_blank_ends_the_grasp_with_the_second_image():
 @every_case(("speed_m_s", "name"), [(0.01, "left pad stuck"), (0.0, "pads disagree")])
 def test_a_force_that_stands_still_while_the_other_one_rises_is_stuck(speed_m_s, name):
     """Where the fingers rest, it can also be the one that rises that is wrong."""
-    stuck = StuckForce(pads_hz=24.0)
-    assert faults_of(stuck.see, course(0.2, left=2.0, right=lambda t: 2.0 + 0.01 * (t // 0.04))) == []
+    see = partial(PadBalance(CONTACT_N, pads_hz=24.0).see, new=False)
+    assert faults_of(see, course(0.2, left=2.0, right=lambda t: 2.0 + 0.01 * (t // 0.04)), SQUEEZE) == []
     rising = course(0.4, gap=lambda t: 0.05 - speed_m_s * t, left=2.0, right=lambda t: 2.0 + 10.0 * t)
-    _, fault = faults_of(stuck.see, [now._replace(t_s=now.t_s + 0.2) for now in rising])[0]
+    _, fault = faults_of(see, [now._replace(t_s=now.t_s + 0.2) for now in rising], SQUEEZE)[0]
     assert (fault.name, fault.ends) == (name, True)
 
 
@@ -651,8 +652,10 @@ def test_fingers_that_are_closed_or_move_do_not_stand_still():
     [(0.0, 0.0, True), (-20.0, -20.0, True), (0.0, 5.0, False), (0.4, 0.4, False)],
 )
 def test_pads_that_both_feel_nothing_in_the_hold_are_told(left_n, right_n, told):
-    faults = faults_of(EmptyHold(CONTACT_N).see, course(0.2, left=left_n, right=right_n))
-    assert {fault.ends for _, fault in faults} == ({False} if told else set())
+    see = partial(PadBalance(CONTACT_N).see, new=False)
+    faults = faults_of(see, course(0.2, left=left_n, right=right_n), HOLD)
+    name = "pads feel nothing in the hold"
+    assert {fault.ends for _, fault in faults if fault.name == name} == ({False} if told else set())
 
 
 @every_case(("pads_hz", "ends"), [(0.0, True), (24.4, False)])

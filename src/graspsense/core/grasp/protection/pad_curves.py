@@ -205,7 +205,7 @@ class PadCurves:
         self._gaps: deque[tuple[float, float]] = deque()
         self._counter, self._t_s = 0, nan
         self._least_gap_m = inf
-        self._spikes, self._balance = Spikes(contact_n), PadBalance(contact_n)
+        self._spikes, self._balance = Spikes(contact_n), PadBalance(contact_n, pads_hz)
 
     def see(self, reading: Reading, phase: int) -> list[Fault]:
         """Take the reading of a tick; return the faults that it shows."""

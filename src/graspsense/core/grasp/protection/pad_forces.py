@@ -46,13 +46,19 @@ EMPTY_S: Final = 0.1
 
 
 class PadBalance:
-    """Compares the forces of both pads while they press: at rest, and while the force rises or falls.
+    """Compares the forces of both pads, which come at this rate (Hz; 0: not known), while they press.
 
     Friction holds an object that one finger has pushed, so that this finger feels more throughout; a wrong scale lets
-    the difference grow with the force.
+    the difference grow with the force. A force that stands still while the other one changes is found also where it has
+    no noise, or no cells.
     """
 
-    def __init__(self, contact_n: float) -> None:
+    def __init__(self, contact_n: float, pads_hz: float = 0.0) -> None:
+        self._still_s = max(STILL_S, IMAGES / pads_hz) if pads_hz > 0.0 else STILL_S
+        self._forces = (nan, nan)
+        self._stood = [(nan, nan, nan), (nan, nan, nan)]
+        """Of each pad, since when its force has stood (s), and the other force (N) and the gap (m) at that time."""
+        self._empty_n, self._empty_s = EMPTY_SHARE * contact_n, 0.0
         self._left, self._right = RecentMean(MEAN_S), RecentMean(MEAN_S)
         self._held_s = 0.0
         self._scaled_n, self._free_n = SCALED_CONTACTS * contact_n, FREE_SHARE * contact_n
@@ -76,8 +82,10 @@ class PadBalance:
         elif phase in CLOSING and self._free_n <= greatest_n < self._light_n:
             self._light_n, self._light_more_n = greatest_n, more_n
         self._held_s = self._held_s + frame.dt_s if phase == Phase.HOLD else 0.0
-        if self.ended:
-            return None
+        pressed = self._stuck(frame, forces) if phase in (Phase.SQUEEZE, Phase.HOLD) else None
+        pressed = pressed or (self._empty(greatest_n, frame.dt_s) if phase == Phase.HOLD else None)
+        if pressed is not None or self.ended:
+            return pressed
         at_rest = self._at_rest(frame) if phase == Phase.HOLD else None
         return at_rest or (self._changing(forces, phase) if new else None)
 
@@ -116,58 +124,32 @@ class PadBalance:
             "though both touch one object: one is late, has another scale, or lost its zero; check both fingertips",
         )
 
-
-class StuckForce:
-    """Compares the forces of both pads from the contact on; for grippers without noise or without cells too.
-
-    `pads_hz` is the rate of the forces, 0 if it is not known.
-    """
-
-    def __init__(self, pads_hz: float) -> None:
-        self._still_s = max(STILL_S, IMAGES / pads_hz) if pads_hz > 0.0 else STILL_S
-        self._forces = (nan, nan)
-        self._since: list[float] = [nan, nan]
-        self._others: list[float] = [nan, nan]
-        self._gaps_m: list[float] = [nan, nan]
-
-    def see(self, frame: Frame) -> Fault | None:
-        """Take the frame of a tick of the squeeze or the hold, and return a pad that it shows to be stuck.
-
-        While the fingers rest, it can also be the other one that is wrong.
-        """
-        forces = (frame.force_left_n, frame.force_right_n)
+    def _stuck(self, frame: Frame, forces: tuple[float, float]) -> Fault | None:
+        """Return the fault of a pad that stands still; while the fingers rest, the other one can also be wrong."""
+        last, self._forces = self._forces, forces
         for i, side in enumerate(("left", "right")):
-            if forces[i] != self._forces[i]:
-                self._since[i], self._others[i], self._gaps_m[i] = frame.t_s, forces[1 - i], frame.gap_m
+            since_s, other_n, gap_m = self._stood[i]
+            if forces[i] != last[i]:
+                self._stood[i] = frame.t_s, forces[1 - i], frame.gap_m
             elif (
-                frame.t_s - self._since[i] >= self._still_s
-                and abs(forces[1 - i] - self._others[i]) >= CHANGE_N
-                and self._forces[1 - i] == self._forces[1 - i]
+                frame.t_s - since_s >= self._still_s
+                and abs(forces[1 - i] - other_n) >= CHANGE_N
+                and last[1 - i] == last[1 - i]
             ):
                 words = (
-                    f"its force has stood at {forces[i]:.2f} N for {frame.t_s - self._since[i]:.2f} s, while that of "
-                    f"the other pad went from {self._others[i]:.2f} to {forces[1 - i]:.2f} N"
+                    f"its force has stood at {forces[i]:.2f} N for {frame.t_s - since_s:.2f} s, while that of "
+                    f"the other pad went from {other_n:.2f} to {forces[1 - i]:.2f} N"
                 )
-                if abs(frame.gap_m - self._gaps_m[i]) < RESTS_M:
+                if abs(frame.gap_m - gap_m) < RESTS_M:
                     words = f"{side} pad: {words}, and the fingers rest: one is stuck, or the other jumps or is late"
                     return Fault("pads disagree", f"{words}; check the cables of both", ends=True)
                 return Fault(f"{side} pad stuck", f"{words}: check its cable", ends=True)
-        self._forces = forces
         return None
 
-
-class EmptyHold:
-    """Sees that both pads feel nothing while the fingers hold what both have felt."""
-
-    def __init__(self, contact_n: float) -> None:
-        self._free_n = EMPTY_SHARE * contact_n
-        self._lasts_s = 0.0
-
-    def see(self, frame: Frame) -> Fault | None:
-        """Take the frame of a tick of the hold; return the fault once it has lasted."""
-        felt_n = max(frame.force_left_n, frame.force_right_n)
-        self._lasts_s = lasting(self._lasts_s, felt_n < self._free_n, frame.dt_s)
-        if self._lasts_s <= EMPTY_S:
+    def _empty(self, felt_n: float, dt_s: float) -> Fault | None:
+        """Return the fault of pads that both feel nothing while the fingers hold what both have felt."""
+        self._empty_s = lasting(self._empty_s, felt_n < self._empty_n, dt_s)
+        if self._empty_s <= EMPTY_S:
             return None
         return Fault(
             "pads feel nothing in the hold",

@@ -24,7 +24,6 @@ from graspsense.core.grasp.protection.losses import FRAMES_LOST, Losses
 from graspsense.core.grasp.protection.motor import REVERSED, FeltForce, FreeEffort, Motor
 from graspsense.core.grasp.protection.opening import Opening
 from graspsense.core.grasp.protection.pad_curves import PadCurves
-from graspsense.core.grasp.protection.pad_forces import EmptyHold, StuckForce
 from graspsense.core.grasp.protection.reports import (
     EFFORT_ABSENT,
     GAP_ABSENT,
@@ -94,8 +93,7 @@ class Protection:
         pads_hz = min(rates.get("force_left", 0.0), rates.get("force_right", 0.0))
         self._drift = Drift(contact_n)
         self._touch = Touch(contact_n, run.first_effort_n, pads_hz, self._drift.on_some_cells, info.rate_hz)
-        self._stuck = StuckForce(pads_hz)
-        self._curves, self._empty_hold = PadCurves(contact_n, pads_hz), EmptyHold(contact_n)
+        self._curves = PadCurves(contact_n, pads_hz)
         self._felt, self._gap_speed = (
             FeltForce(info.rate_hz, pads_hz, info.friction_n),
             GapSpeed(info.rate_hz, "velocity" in rates),
@@ -263,10 +261,6 @@ class Protection:
         if phase == APPROACH and free:
             for fault in self._drift.see(reading):
                 self._see(fault)
-        elif phase in (SQUEEZE, HOLD):
-            self._see(self._stuck.see(frame))
-            if phase == HOLD:
-                self._see(self._empty_hold.see(frame))
 
     def _see(self, fault: Fault | None, phase: int = APPROACH) -> None:
         if fault is None:

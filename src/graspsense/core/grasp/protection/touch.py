@@ -102,7 +102,8 @@ class Touch:
     """Watches both pads against the motion of the fingers, from the approach to the hold.
 
     `usual_effort_n` limits a contact that is not clear where the approach has shown no effort. `pads_hz` is the rate of
-    the forces of the pads, 0 if it is not known, and `rate_hz` that of the frames. `on_some_cells` returns whether both forces rose on some cells only.
+    the forces of the pads, 0 if it is not known, and `rate_hz` that of the frames. `on_some_cells` returns whether both
+    forces rose on some cells only.
     """
 
     def __init__(
