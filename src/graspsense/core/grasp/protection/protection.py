@@ -82,10 +82,7 @@ class Protection:
         self._effort_limit_n = info.effort_limit_n
         self._approach_n = max(self.ceiling_n, run.first_effort_n if run.first_effort_n < inf else 0.0)
         self._relaxed = info.relaxed
-        opening_n = (
-            abs(info.opening.value) if info.opening is not None and info.opening.kind == EFFORT else 0.0
-        )
-        self._opening_n = max(self.ceiling_n, opening_n)
+        self._opening_n = self.ceiling_n
         contact_n = controller.contact_force_n()
         # Where only the entry of a plugin declares the channels, the frames show which there are.
         self._declared = bool(rates)
@@ -94,10 +91,8 @@ class Protection:
         self._drift = Drift(contact_n)
         self._touch = Touch(contact_n, run.first_effort_n, pads_hz, self._drift.on_some_cells, info.rate_hz)
         self._curves = PadCurves(contact_n, pads_hz)
-        self._felt, self._gap_speed = (
-            FeltForce(info.rate_hz, pads_hz, info.friction_n),
-            GapSpeed(info.rate_hz, "velocity" in rates),
-        )
+        self._felt = FeltForce(info.rate_hz, pads_hz, info.friction_n)
+        self._gap_speed = GapSpeed(info.rate_hz, "velocity" in rates)
         self._free_effort = FreeEffort(info.friction_n)
         self._fingertips = Fingertips()
         self._motor = Motor("effort" in rates, info.rate_hz)
@@ -114,6 +109,8 @@ class Protection:
         if opening is not None:
             # What the guard leaves of it, where no pad has felt anything.
             opening = opening._replace(speed_limit_m_s=min(opening.speed_limit_m_s, first_m_s))
+            if opening.kind == EFFORT:
+                self._opening_n = max(self.ceiling_n, abs(opening.value))
         self.opening = Opening(
             info.rate_hz,
             command_delay_s,
