@@ -47,6 +47,7 @@ from graspsense.core.values.signals import no_pads as no_pads
 from graspsense.core.components.channels import no_signals as no_signals
 
 # Calibration: from cell counts to newtons
+from graspsense.core.grasp.calibration import SCALE_UNSEEN as SCALE_UNSEEN
 from graspsense.core.grasp.calibration import LoadTable as LoadTable
 from graspsense.core.grasp.calibration import MotorTable as MotorTable
 from graspsense.core.grasp.calibration import asked_force as asked_force

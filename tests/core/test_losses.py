@@ -1,8 +1,10 @@
 """Frames, images and samples that did not arrive are in the outcome, the counts and the report of a grasp."""
 
 from graspsense.core.components.run_config import RunConfig
+from graspsense.core.grasp.protection.losses import Losses
 from graspsense.core.grasp.runner import run_grasp
-from graspsense.plugin_api import Channel, FastChannel, Reading, TactileArray, create
+from graspsense.core.values.signals import APPROACH
+from graspsense.plugin_api import NO_PADS, Channel, FastChannel, Frame, Reading, TactileArray, create
 from graspsense.simulator_api import CHANNELS
 from graspsense.testing.model_gripper import OBJECTS, TICKS_OF_AN_IMAGE, ModelGripper
 
@@ -42,7 +44,26 @@ def test_losses_are_told_with_the_outcome_and_counted():
     assert {name: grasp.report[name] for name in lost} == lost
     assert "2 frames" in grasp.reason
     assert "1 of pads" in grasp.reason
+    assert "off by 41 ms" in grasp.reason, "an image comes each 41 ticks"
     assert grasp.outcome.words == "steady"
+
+
+def test_lost_frames_are_told_with_their_share_and_end_the_grasp_from_one_half_on():
+    def faults(steps_s, phase=APPROACH):
+        losses = Losses(1000.0)
+        frames = (Frame(0.0, dt_s, 0.05, *[0.0] * 6, 0) for dt_s in steps_s)
+        return losses, [losses.see(Reading(frame, NO_PADS), phase, jumped=False) for frame in frames]
+
+    # Two of three frames come, then one of three.
+    losses, seen = faults([0.001, 0.002] * 200)
+    assert {fault.ends for fault in seen if fault is not None} == {False}
+    assert "33 %" in seen[-1].words
+    assert losses.lost == {"frames": 200}
+    assert faults([0.003] * 400)[1][-1].ends
+    # Frames that only come unevenly are not lost.
+    losses, seen = faults([0.0016, 0.0004] * 500)
+    assert seen == [None] * 1000
+    assert losses.in_words() == ""
 
 
 def test_nothing_is_told_where_nothing_was_lost():

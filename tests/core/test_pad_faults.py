@@ -8,17 +8,15 @@ from grippers import Scripted, bottle, squeezing
 
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.protection.drift import Drift
+from graspsense.core.grasp.protection.opening import Opening
 from graspsense.core.grasp.protection.pad_curves import PadCurves
-from graspsense.core.grasp.protection.pad_forces import PadBalance
-from graspsense.core.grasp.protection.touch import Touch
+from graspsense.core.grasp.protection.reports import PADS_ABSENT, Absence
 from graspsense.core.grasp.runner import run_grasp
 from graspsense.core.values.signals import (
     APPROACH,
-    EFFORT,
     HOLD,
     NO_PADS,
     SQUEEZE,
-    Command,
     Frame,
     Outcome,
     Phase,
@@ -59,7 +57,8 @@ def sound(t_s, sound_n):
 
 def told(left=sound, right=sound, noise_n=0.03, pads_hz=PADS_HZ, gap_late_s=0.0):
     """Return the names of the faults in a grasp whose pads give these forces, sampled at `pads_hz`."""
-    curves, balance, drift = PadCurves(CONTACT_N, pads_hz), PadBalance(CONTACT_N), Drift(CONTACT_N)
+    curves, drift = PadCurves(CONTACT_N, pads_hz), Drift(CONTACT_N)
+    opening = Opening(1000.0, 0.0, None, tells_gap=True, contact_n=CONTACT_N)
     gauss, faults = Random(0).gauss, []
     last, forces = -1, (0.0, 0.0)
     for k in range(round(END_S * 1000)):
@@ -72,7 +71,7 @@ def told(left=sound, right=sound, noise_n=0.03, pads_hz=PADS_HZ, gap_late_s=0.0)
             forces = tuple(pad(t_s, sound_n + gauss(0.0, noise_n)) for pad in (left, right))
         frame = Frame(t_s, 0.001, gap_m(t_s - gap_late_s), 0.0, 0.0, *forces, 0.0, 0.0, 0)
         phase, reading = phase_of(t_s), Reading(frame, NO_PADS)
-        seen = [*curves.see(reading, phase), balance.see(frame, phase) if phase <= HOLD else None]
+        seen = [*curves.see(reading, phase), opening.see(frame, phase)]
         if phase == APPROACH and max(forces) < CONTACT_N:
             seen += drift.see(reading)
         faults += [fault.name for fault in seen if fault is not None]
@@ -157,19 +156,18 @@ def test_a_fault_of_both_pads_that_the_way_back_shows_is_told(both, noise_n, fau
 
 @every_case(("share", "name"), [(0.2, "left pad absent"), (0.02, None)])
 def test_a_force_that_is_no_number_now_and_then_is_told_and_does_not_end_the_grasp(share, name):
-    touch, chance, faults = Touch(CONTACT_N), Random(0).random, []
+    absence, chance, faults = Absence(PADS_ABSENT[0], PADS_HZ, expected=True), Random(0).random, []
     for k in range(1000):
         left_n = nan if chance() < share else 3.0
         frame = Frame(k / 1000, 0.001, 0.05, 0.0, 0.0, left_n, 3.0, 0.0, 0.0, 0)
-        touch.see(frame, HOLD, Command(EFFORT, 8.0, 8.0, 1.0))
-        faults += touch.absent(frame)
-    seen = {(fault.name, fault.ends) for fault in faults}
+        faults.append(absence.see(left_n, frame))
+    seen = {(fault.name, fault.ends) for fault in faults if fault is not None}
     assert seen == ({(name, False)} if name else set())
 
 
 def test_pads_that_differ_while_an_arm_moves_what_they_hold_are_not_accused():
     """Half a kilogram that is shaken by 10 m/s2, 3 times a second, from a second after the rest on."""
-    curves, balance, gauss = PadCurves(CONTACT_N, PADS_HZ), PadBalance(CONTACT_N), Random(0).gauss
+    curves, gauss = PadCurves(CONTACT_N, PADS_HZ), Random(0).gauss
     for k in range(round(PADS_HZ * 6.0)):
         t_s = k / PADS_HZ
         more_n = 5.0 * sin(2.0 * pi * 3.0 * t_s) if t_s > REST_S + 1.1 else 0.0
@@ -178,7 +176,6 @@ def test_pads_that_differ_while_an_arm_moves_what_they_hold_are_not_accused():
         frame = Frame(t_s, 1.0 / PADS_HZ, gap_m(min(t_s, REST_S)), 0.0, 0.0, *forces, 0.0, 0.0, 0)
         phase = phase_of(min(t_s, REST_S))
         assert curves.see(Reading(frame, NO_PADS), phase) == []
-        assert balance.see(frame, phase) is None
 
 
 def test_a_side_impact_says_which_edge_felt_how_much():

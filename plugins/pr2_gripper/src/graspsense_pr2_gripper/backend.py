@@ -11,6 +11,7 @@ from typing import Final, final
 from attrs import asdict, evolve
 
 from graspsense.gripper_api import (
+    SCALE_UNSEEN,
     BackendWithEmulator,
     calibrations_of,
     stored_friction,
@@ -210,7 +211,9 @@ class Pr2Backend(BackendWithEmulator[Pr2Config]):
             notes.append("the board has no accelerometer: the channel acceleration stays empty")
         if emulation is not None:
             notes += ["emulated: no gripper was touched", *emulation.body_info.notes]
-        elif (config.vendor_id, config.product_id) == TEST_NUMBER:
+        elif "load-cell" not in stored:
+            notes.append(f"the pads have no load table (graspsense calibrate load-cell): {SCALE_UNSEEN}")
+        if emulation is None and (config.vendor_id, config.product_id) == TEST_NUMBER:
             notes.append("1209:0001 is a number for private tests: do not pass on a device that has it")
         return DeviceInfo(
             name="PR2 gripper" if emulation is None else f"emulated PR2 gripper over {config.body}",

@@ -118,8 +118,8 @@ _COMMON: Final = (
     ),
     StatusBit(
         mask=REPORTS_LOST,
-        name="reports lost",
-        meaning="forces and gaps are missing, so rates and times are less exact: check the cable and the USB hub",
+        name="frames lost",
+        meaning="reports did not arrive, so rates and times are less exact: check the cable and the USB hub",
         limit_s=GAPS_S,
     ),
 )

@@ -10,6 +10,7 @@ from types import MappingProxyType
 from typing import Any, Final, final
 
 from graspsense.gripper_api import (
+    SCALE_UNSEEN,
     BackendWithEmulator,
     DeadManSwitch,
     Polling,
@@ -252,7 +253,7 @@ class RobotiqBackend(BackendWithEmulator[RobotiqConfig]):
             notes=(
                 "effort is the motor's current times gripper.newtons_per_ampere, an assumption unless you measured it",
                 *(
-                    ("the forces are counts over gripper.pad_counts_per_newton, likewise",)
+                    ("the forces are counts over gripper.pad_counts_per_newton, likewise: " + SCALE_UNSEEN,)
                     if self.config.tactile_port
                     else ()
                 ),

@@ -23,6 +23,8 @@ TARE_DRIFT_N: Final = 3.0
 
 Offsets also differ between runs, on the PR2 by up to some hundred counts a cell, or 200 * 15 / 1600 = 1.9 N on a pad.
 """
+SCALE_UNSEEN: Final = "no check tells a wrong scale of both pads from a stiffer object"
+"""What a gripper says of pads that were not calibrated."""
 LARGEST_COUNT: Final = 65535.0
 """The largest count of 16 bits."""
 PAD_DIGITS: Final = 5

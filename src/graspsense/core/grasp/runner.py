@@ -37,7 +37,6 @@ from graspsense.core.control.tick import (
     tick,
 )
 from graspsense.core.grasp.interrupts import STUCK_S, Interrupts
-from graspsense.core.grasp.losses import Losses, lost_in_words
 from graspsense.core.grasp.opened_gripper import (
     described,
     frame_timeout_s,
@@ -173,7 +172,8 @@ def run_grasp(
         # After closing, so that the report covers it.
         report = _report_of(backend)
     frames = grasp.recorder.frames
-    losses = grasp.losses.counts() if grasp.losses is not None else {}
+    losses = {} if grasp.protection is None else grasp.protection.losses.lost
+    losses = {f"lost_{name}": count for name, count in losses.items()}
     commands = backend.recorded_commands()
     if commands is not None:
         grasp.recorder.commands[:] = commands[: len(frames)]
@@ -273,8 +273,6 @@ class _Grasp:
         self.params = tick_params(info, controller, run)
         self.protection = None if info.harmless else self._protection()
         self.delivered = Delivered(info.channels)
-        # The times of a recording are those of its own devices.
-        self.losses = Losses(info.rate_hz) if info.opening is not None else None
         self.state: TickState = first_state(controller.init())
         self.recorder = TraceRecorder({**SI_UNITS, **info.units})
         self.events: list[GraspEvent] = []
@@ -364,7 +362,7 @@ class _Grasp:
             reason = reason or str(self.controller.reason(self.state.law))
         except FAILURES as error:
             reason = f"reason failed: {named(error)}"
-        lost = "" if self.losses is None else lost_in_words(self.losses.lost)
+        lost = "" if self.protection is None else self.protection.lost
         closed = MAY_BE_CLOSED if self.may_be_closed else ""
         return "; ".join(filter(None, (reason, closed, lost, *self.failed_sinks)))
 
@@ -379,7 +377,7 @@ class _Grasp:
         state, phase, watcher = self.state, self.state.phase, self.state.guard
         images: list[Pads] = []
         newest = n_ticks = 0
-        most_ticks, losses = self._most_ticks(seconds_at_most(run)), self.losses
+        most_ticks = self._most_ticks(seconds_at_most(run))
         while n_ticks < most_ticks:
             n_ticks += 1
             reading = self._read(timeout_s)
@@ -408,8 +406,6 @@ class _Grasp:
             recorded = phase >= APPROACH and stepped
             if recorded:
                 self.late += frame.dt_s > late_s
-                if losses is not None:
-                    losses.see(reading)
                 self._count(phase, self._acted(state) > acted)
             try:
                 apply(command)

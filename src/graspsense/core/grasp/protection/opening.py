@@ -9,6 +9,8 @@ from __future__ import annotations
 from math import inf, nan
 from typing import Final
 
+from graspsense.core.grasp.protection.pad_curves import SLACK_M
+from graspsense.core.grasp.protection.pad_forces import FREE_SHARE
 from graspsense.core.grasp.protection.touch import CLOSED_M
 from graspsense.core.values.faults import Fault
 from graspsense.core.values.signals import APPROACH, EFFORT, POSITION, Command, Frame, Phase
@@ -23,6 +25,9 @@ LATE_S: Final = 0.16
 """Time beyond the delay of a command after which the gap is late; at least four frames. Set with emulated grippers."""
 STANDS_S: Final = 0.5
 """Time beyond it after which the fingers count as not opened; at least six frames."""
+LET_GO_S: Final = 0.04
+FEWEST_LATE: Final = 4
+"""Time, in which more than so many frames have come, for which pads may be free before the gap opens."""
 RESTED_S: Final = 0.1
 """Time for which fingers must have rested that have to open at once: others brake first."""
 TARGET_M: Final = 0.002
@@ -39,7 +44,8 @@ class Opening:
     """Watches the gap of a gripper with this rate of frames (Hz) and delay of commands (s), which this command opens.
 
     `tells_gap` says whether the frames have a gap at all, and `friction_n` is that of the drive (N; 0: not known),
-    and `open_gap_m` the gap of open fingers where the command does not say it.
+    and `open_gap_m` the gap of open fingers where the command does not say it. Pads that held an object with
+    `contact_n` let go when the fingers open; pads that are slow do so later, and show nothing.
     """
 
     def __init__(
@@ -50,6 +56,7 @@ class Opening:
         tells_gap: bool,
         friction_n: float = 0.0,
         open_gap_m: float = nan,
+        contact_n: float = inf,
     ) -> None:
         self._late_s = command_delay_s + max(LATE_S, 4.0 / rate_hz)
         self.stands_s = command_delay_s + max(STANDS_S, 6.0 / rate_hz)
@@ -64,7 +71,10 @@ class Opening:
         self._first_m = nan
         self._widest_m, self._began_s = -inf, nan
         self._start_m = self._start_s = self._rest_m = self._rest_s = nan
-        self._opened = False
+        self._opened = self._held = False
+        self._contact_n = contact_n
+        self._gap_m = self._free_t_s = nan
+        self._free_frames = 0
 
     def before_closing(self, frame: Frame) -> Fault | None:
         """Take the frame in which the fingers are open; return what is wrong with their width."""
@@ -87,34 +97,56 @@ class Opening:
 
     def see(self, frame: Frame, phase: int) -> Fault | None:
         """Take the frame of a tick; return what is wrong with the opening after the grasp."""
+        last_m, self._gap_m = self._gap_m, frame.gap_m
         if phase != Phase.RELEASE:
             if phase >= APPROACH:
-                if self._began_s != self._began_s:
-                    self._began_s = frame.t_s
-                self._widest_m = max(self._widest_m, frame.gap_m)
-                self._start_m, self._start_s = frame.gap_m, frame.t_s
-                if not abs(frame.gap_m - self._rest_m) < OPENED_M:
-                    self._rest_m, self._rest_s = frame.gap_m, frame.t_s
+                self._closes(frame)
             return None
         if self._opened:
             return None
         closed_m, elapsed_s = self._widest_m - self._start_m, frame.t_s - self._start_s
         # A gap that is late closes on for a while, as that of fingers which brake.
         self._start_m = min(self._start_m, frame.gap_m)
-        self._opened = frame.gap_m - self._start_m >= OPENED_M
+        opened_m = frame.gap_m - self._start_m
+        self._opened = opened_m >= OPENED_M
+        let_go_s = self._let_go_s(frame)
         if not closed_m >= LEAST_TRAVEL_M:
             return self._stood(self._start_s - self._began_s) if closed_m == 0.0 else None
         if self._opened:
-            rested = self._start_s - self._rest_s >= RESTED_S
-            return self._late(elapsed_s) if rested and elapsed_s > self._late_s else None
+            # When it began, by its speed: a frame can come long after that.
+            began_s = elapsed_s - frame.dt_s * opened_m / max(frame.gap_m - last_m, SLACK_M)
+            if self._start_s - self._rest_s < RESTED_S or not began_s > self._late_s:
+                return None
+            return self._late(f"it changed only {began_s:.2f} s after the fingers were told to open")
         if elapsed_s < self.stands_s:
-            return None
+            if not (let_go_s > LET_GO_S and opened_m <= SLACK_M):
+                return None
+            return self._late(f"both pads let go {let_go_s:.2f} s ago, and it has not changed yet")
         return Fault(
             "fingers did not open",
             f"the gap still is {frame.gap_m * 1e3:.1f} mm, {elapsed_s:.1f} s after they were told to: they hold on, or "
             "the gap has stood still for longer, so that what follows from it is wrong; look at the fingers and the "
             "encoder",
         )
+
+    def _closes(self, frame: Frame) -> None:
+        """Take the frame of a tick before the release."""
+        if self._began_s != self._began_s:
+            self._began_s = frame.t_s
+        self._widest_m = max(self._widest_m, frame.gap_m)
+        self._start_m, self._start_s = frame.gap_m, frame.t_s
+        if not abs(frame.gap_m - self._rest_m) < OPENED_M:
+            self._rest_m, self._rest_s = frame.gap_m, frame.t_s
+        self._held = min(frame.force_left_n, frame.force_right_n) >= self._contact_n
+        self._free_t_s = frame.t_s
+
+    def _let_go_s(self, frame: Frame) -> float:
+        """Return for how long (s) pads that held an object have been free; 0 in the first frames."""
+        if not max(frame.force_left_n, frame.force_right_n) < FREE_SHARE * self._contact_n:
+            self._free_t_s, self._free_frames = frame.t_s, 0
+            return 0.0
+        self._free_frames += 1
+        return frame.t_s - self._free_t_s if self._held and self._free_frames > FEWEST_LATE else 0.0
 
     def unknown_s(self, gap_m: float) -> float:
         """Return for how long (s) from their command on it is not known whether fingers at this gap are open.
@@ -164,9 +196,7 @@ class Opening:
             "object is not too wide; look at the fingers and the encoder",
         )
 
-    def _late(self, elapsed_s: float) -> Fault:
+    def _late(self, what: str) -> Fault:
         return Fault(
-            "gap late",
-            f"it changed only {elapsed_s:.2f} s after the fingers were told to open: times and rates of the "
-            "squeeze can be off by that; check the connection",
+            "gap late", f"{what}: times and rates of the squeeze can be off by that; check the connection"
         )

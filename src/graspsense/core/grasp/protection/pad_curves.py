@@ -13,9 +13,9 @@ from typing import Final
 import numpy as np
 
 from graspsense.core.grasp.protection.cells import DOUBT, FEWEST_IMAGES, MOST_NOISY, frozen
-from graspsense.core.grasp.protection.pad_forces import FREE_SHARE, HELD_S
+from graspsense.core.grasp.protection.pad_forces import FREE_SHARE, PadBalance
 from graspsense.core.values.faults import Fault
-from graspsense.core.values.signals import APPROACH, CLOSING, HOLD, Frame, Phase, Reading
+from graspsense.core.values.signals import APPROACH, CLOSING, Phase, Reading
 
 LATE_S: Final = 0.02
 LATE_PERIODS: Final = 1.25
@@ -33,12 +33,9 @@ MORE_S: Final = 0.02
 """So many samples in a row, over so long a time, show that it does."""
 OPENED_M: Final = 0.005
 """So much wider than at the contact, no object touches both fingers any more."""
-LET_GO_S: Final = 0.04
-"""Time, in which more than `FEWEST_LATE` frames have come, for which pads may be free before the gap opens."""
 FEWEST_OPEN: Final = 2
 OPEN_S: Final = 0.03
 """So many samples at the end of the release, and so long a time after the object, show the zero of a pad."""
-FEWEST_LATE: Final = 4
 ZERO_CONTACTS: Final = 0.5
 ZERO_SHARE: Final = 0.1
 """By how much the zero may have moved: a share of the contact force, or of the greatest force. The PR2's object
@@ -47,11 +44,6 @@ SPIKE_CONTACTS: Final = 0.8
 SPIKE_SHARE: Final = 0.15
 """By how much a sample may differ from the mean of its neighbours, over what the other pad shows: a share of the
 contact force, or of the force."""
-FRICTION_N: Final = 1.5
-"""Difference that friction can hold: of half a kilogram on a table."""
-APART_SHARE: Final = 0.3
-FEWEST_APART: Final = 3
-"""Share of the greatest force by which the pads may differ besides, in so many samples in a row."""
 RETURNS: Final = 0.3
 """Share of a jump by which the next sample goes back if it is noise; beyond a step, the force stays."""
 FEWEST_SPIKES: Final = 2
@@ -202,39 +194,6 @@ class Spikes:
         )
 
 
-class LateGap:
-    """Sees a gap that stands still after both pads have let go: the fingers have moved before it tells so.
-
-    Pads that are slow let go later than the fingers, and hide it.
-    """
-
-    def __init__(self, contact_n: float) -> None:
-        self._contact_n = contact_n
-        self._held = False
-        self._least_m = inf
-        self._free_t_s, self._frames = nan, 0
-
-    def see(self, frame: Frame, phase: int) -> Fault | None:
-        """Take the frame of a tick; return the fault in the release."""
-        forces = (frame.force_left_n, frame.force_right_n)
-        self._least_m = min(self._least_m, frame.gap_m)
-        if phase != Phase.RELEASE:
-            self._held = min(forces) >= self._contact_n
-        if phase != Phase.RELEASE or not max(forces) < FREE_SHARE * self._contact_n:
-            self._free_t_s, self._frames = frame.t_s, 0
-            return None
-        self._frames += 1
-        late_s = frame.t_s - self._free_t_s
-        stands = frame.gap_m - self._least_m <= SLACK_M
-        if not (self._held and stands and self._frames > FEWEST_LATE and late_s > LET_GO_S):
-            return None
-        return Fault(
-            "gap late",
-            f"both pads let go {late_s:.2f} s ago, and it has not changed yet: times and rates of the squeeze can be "
-            "off by that; check the connection",
-        )
-
-
 class PadCurves:
     """Both pads of a gripper with forces at this rate (Hz; 0: not known)."""
 
@@ -246,12 +205,7 @@ class PadCurves:
         self._gaps: deque[tuple[float, float]] = deque()
         self._counter, self._t_s = 0, nan
         self._least_gap_m = inf
-        self._spikes, self._late_gap = Spikes(contact_n), LateGap(contact_n)
-        self._pushed_n = self._pressed_n = 0.0
-        """What the left pad felt more than the right one before both touched, and the greatest force of both (N)."""
-        self._apart_samples = 0
-        self._unheld_t_s = nan
-        """Time of the last sample before the hold."""
+        self._spikes, self._balance = Spikes(contact_n), PadBalance(contact_n, pads_hz)
 
     def see(self, reading: Reading, phase: int) -> list[Fault]:
         """Take the reading of a tick; return the faults that it shows."""
@@ -261,19 +215,15 @@ class PadCurves:
         while len(gaps) > 1 and gaps[1][0] <= frame.t_s - self._late_s:
             gaps.popleft()
         closing = phase in CLOSING
-        late = self._late_gap.see(frame, phase)
-        if late is not None or not self._is_new(reading):
-            return [] if late is None else [late]
+        new = self._is_new(reading)
+        faults = [self._balance.see(frame, phase, new=new)]
+        if not new:
+            return [fault for fault in faults if fault is not None]
         earlier_gap_m = gaps[0][1]
         self._least_gap_m = min(self._least_gap_m, earlier_gap_m)
         forces = (frame.force_left_n, frame.force_right_n)
-        if phase != HOLD:
-            self._unheld_t_s = frame.t_s
-        moved = frame.t_s - self._unheld_t_s > HELD_S
-        faults = [
-            None if moved else self._apart(forces, phase),
-            self._spikes.see(forces, phase) if closing and not moved else None,
-        ]
+        if closing and not self._balance.ended:
+            faults.append(self._spikes.see(forces, phase))
         for pad, force_n in zip(self._pads, forces, strict=True):
             if force_n != force_n or earlier_gap_m != earlier_gap_m:
                 continue
@@ -291,22 +241,6 @@ class PadCurves:
     def released(self, t_s: float) -> list[Fault]:
         """Return what the pads show at the end of the release (s)."""
         return [fault for pad in self._pads if (fault := pad.released(t_s)) is not None]
-
-    def _apart(self, forces: tuple[float, float], phase: int) -> Fault | None:
-        """Return the fault of pads that differ by more than friction holds while the force rises or falls."""
-        difference_n = forces[0] - forces[1]
-        if phase == APPROACH and min(forces) < FREE_SHARE * self._contact_n:
-            self._pushed_n = difference_n
-        self._pressed_n = max(self._pressed_n, *forces)
-        apart = abs(difference_n - self._pushed_n) > max(FRICTION_N, APART_SHARE * self._pressed_n)
-        self._apart_samples = self._apart_samples + 1 if apart and phase > APPROACH else 0
-        if self._apart_samples < FEWEST_APART:
-            return None
-        return Fault(
-            "pads disagree",
-            f"while the force changes, the left pad feels {forces[0]:.1f} N and the right one {forces[1]:.1f} N, "
-            "though both touch one object: one is late, has another scale, or lost its zero; check both fingertips",
-        )
 
     def _is_new(self, reading: Reading) -> bool:
         """Return whether this tick has a new force, by the counter of the images or by the rate."""

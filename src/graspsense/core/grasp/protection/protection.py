@@ -20,19 +20,20 @@ from graspsense.core.grasp.protection.cells import Fingertips
 from graspsense.core.grasp.protection.drift import Drift
 from graspsense.core.grasp.protection.effort import ReportedEffort
 from graspsense.core.grasp.protection.effort_ceiling import asked_effort_n, effort_ceiling_n, limited
+from graspsense.core.grasp.protection.losses import FRAMES_LOST, Losses
 from graspsense.core.grasp.protection.motor import REVERSED, FeltForce, FreeEffort, Motor
 from graspsense.core.grasp.protection.opening import Opening
 from graspsense.core.grasp.protection.pad_curves import PadCurves
-from graspsense.core.grasp.protection.pad_forces import EmptyHold, PadBalance, StuckForce
 from graspsense.core.grasp.protection.reports import (
     EFFORT_ABSENT,
     GAP_ABSENT,
+    PADS_ABSENT,
     Absence,
     Repeats,
     Reports,
     StatusWatch,
 )
-from graspsense.core.grasp.protection.speed import GapJump, GapSpeed, KeptSpeed, Rush, Standstill
+from graspsense.core.grasp.protection.speed import GapJump, GapSpeed, KeptSpeed, Standstill
 from graspsense.core.grasp.protection.touch import CLOSED_M, Touch
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.faults import LIMITED, Fault
@@ -81,47 +82,56 @@ class Protection:
         self._effort_limit_n = info.effort_limit_n
         self._approach_n = max(self.ceiling_n, run.first_effort_n if run.first_effort_n < inf else 0.0)
         self._relaxed = info.relaxed
-        opening_n = (
-            abs(info.opening.value) if info.opening is not None and info.opening.kind == EFFORT else 0.0
-        )
-        self._opening_n = max(self.ceiling_n, opening_n)
+        self._opening_n = self.ceiling_n
         contact_n = controller.contact_force_n()
         # Where only the entry of a plugin declares the channels, the frames show which there are.
         self._declared = bool(rates)
         self._has_pads = "force_left" in rates and "force_right" in rates
         pads_hz = min(rates.get("force_left", 0.0), rates.get("force_right", 0.0))
         self._drift = Drift(contact_n)
-        self._touch = Touch(contact_n, run.first_effort_n, pads_hz, self._drift.on_some_cells)
-        self._stuck, self._balance = StuckForce(pads_hz), PadBalance(contact_n)
-        self._curves, self._empty_hold = PadCurves(contact_n, pads_hz), EmptyHold(contact_n)
-        self._felt, self._gap_speed = (
-            FeltForce(info.rate_hz, pads_hz, info.friction_n),
-            GapSpeed(info.rate_hz, "velocity" in rates),
-        )
+        self._touch = Touch(contact_n, run.first_effort_n, pads_hz, self._drift.on_some_cells, info.rate_hz)
+        self._curves = PadCurves(contact_n, pads_hz)
+        self._felt = FeltForce(info.rate_hz, pads_hz, info.friction_n)
+        self._gap_speed = GapSpeed(info.rate_hz, "velocity" in rates)
         self._free_effort = FreeEffort(info.friction_n)
         self._fingertips = Fingertips()
         self._motor = Motor("effort" in rates, info.rate_hz)
         self._effort = ReportedEffort() if "effort" in rates else None
         self._effort_absence = Absence(EFFORT_ABSENT, info.rate_hz, expected="effort" in rates)
         self._gap_absence = Absence(GAP_ABSENT, info.rate_hz, expected="gap" in rates)
+        self._pad_absences = [Absence(fault, pads_hz or inf, expected=True) for fault in PADS_ABSENT]
         self._status = StatusWatch(info.status_bits)
         first_m_s = run.first_speed_m_s if info.clock == "device" else inf
         self._standstill, self._jump = Standstill(), GapJump(info.speed_limit_m_s)
-        self._kept_speed, self._repeats = KeptSpeed(info.rate_hz), Repeats()
+        self._kept_speed = KeptSpeed(info.rate_hz, min(first_m_s, info.speed_limit_m_s))
+        self._repeats = Repeats()
         opening = info.opening
         if opening is not None:
             # What the guard leaves of it, where no pad has felt anything.
             opening = opening._replace(speed_limit_m_s=min(opening.speed_limit_m_s, first_m_s))
+            if opening.kind == EFFORT:
+                self._opening_n = max(self.ceiling_n, abs(opening.value))
         self.opening = Opening(
-            info.rate_hz, command_delay_s, opening, "gap" in rates, info.friction_n, info.open_gap_m
+            info.rate_hz,
+            command_delay_s,
+            opening,
+            "gap" in rates,
+            info.friction_n,
+            info.open_gap_m,
+            contact_n,
         )
-        self._rush = Rush(min(first_m_s, info.speed_limit_m_s), info.rate_hz)
-        self._reports = Reports(info.rate_hz, rates.get("pads", 0.0))
+        self._reports, self.losses = Reports(info.rate_hz, rates.get("pads", 0.0)), Losses(info.rate_hz)
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """The faults that were seen and do not follow from others, each in a sentence."""
-        return tuple(self._told[name].told for name in causes(self._told))
+        lost = f"; {self.losses.in_words()}"
+        return tuple(self._told[name].told + lost * (name == FRAMES_LOST) for name in causes(self._told))
+
+    @property
+    def lost(self) -> str:
+        """What was lost, in words, if no warning tells it."""
+        return "" if FRAMES_LOST in self._told else self.losses.in_words()
 
     def cause_of(self, fault: Fault) -> Fault:
         """Return the fault from which this one follows, or this one itself."""
@@ -153,7 +163,10 @@ class Protection:
         wrong way ends it: the grasp is over, and its outcome stays.
         """
         frame = reading.frame
-        self._see(self._reports.see(reading, phase), phase)
+        reported = self._reports.see(reading, phase)
+        self._see(reported, phase)
+        if phase >= APPROACH:
+            self._see(self.losses.see(reading, phase, jumped=reported is not None), phase)
         for fault in self._status.see(frame, phase):
             self._see(fault, phase)
         jump = self._jump.see(frame)
@@ -219,7 +232,6 @@ class Protection:
         """Take the frame of a tick in which the fingers may move freely, and the command that was applied to it."""
         if phase == APPROACH:
             if self._touch.free():
-                self._see(self._rush.see(frame))
                 self._see(self._repeats.see(frame, jumped=jumped))
                 self._see(self._kept_speed.see(frame, phase))
                 self._see(self._free_effort.see(frame, applied))
@@ -231,10 +243,11 @@ class Protection:
         frame = reading.frame
         closing = phase in CLOSING
         if closing:
-            for fault in self._touch.absent(frame):
-                self._see(fault)
+            for absence, force_n in zip(
+                self._pad_absences, (frame.force_left_n, frame.force_right_n), strict=True
+            ):
+                self._see(absence.see(force_n, frame))
             self._see(self._felt.see(frame))
-            self._see(self._balance.see(frame, phase))
         for fault in self._curves.see(reading, phase):
             self._see(fault, phase)
         free = self._touch.free()
@@ -245,10 +258,6 @@ class Protection:
         if phase == APPROACH and free:
             for fault in self._drift.see(reading):
                 self._see(fault)
-        elif phase in (SQUEEZE, HOLD):
-            self._see(self._stuck.see(frame))
-            if phase == HOLD:
-                self._see(self._empty_hold.see(frame))
 
     def _see(self, fault: Fault | None, phase: int = APPROACH) -> None:
         if fault is None:

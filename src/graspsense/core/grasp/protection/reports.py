@@ -1,4 +1,4 @@
-"""Whether frames, cell images and measurements keep coming, by clock and numbers, and what the status says."""
+"""Whether the clock and the cell images go on, measurements are there, frames come once, and what the status says."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from math import inf, isfinite, nan
 from operator import or_
 from typing import Final
 
+from graspsense.core.grasp.protection.losses import ENDS_SHARE, FEWEST
 from graspsense.core.values.faults import Fault, StatusBit
 from graspsense.core.values.signals import CLOSING, Frame, Reading
 
@@ -18,17 +19,6 @@ FEWEST_STILL: Final = 3
 """Frames in a row that show a clock that stands still."""
 JUMP_S: Final = 0.1
 """Time between two frames, at least five periods, that is a jump of the clock or a stall."""
-LOST_SHARE: Final = 0.02
-"""Share of lost frames from which on a person must know: derivatives of the force then change."""
-ENDS_SHARE: Final = 0.5
-"""Share of lost frames that ends the grasp: a controller that sees half of them does not control."""
-FEWEST: Final = 200
-"""Frames, with the lost ones, after which a share is told."""
-SLOW_S: Final = 2.0
-"""Time after which a share of a slow gripper is told, and by single gaps: its rate is the highest that it has."""
-SINGLE_GAPS: Final = 3
-SINGLE_SHARE: Final = 0.05
-"""Frames of a slow gripper that are missing, and their share, from which on they are told."""
 REPEATS: Final = 3
 """Standstills of an approach from which on the motion after them is compared."""
 RECENT: Final = 20
@@ -53,10 +43,7 @@ IMAGES_LATE_S: Final = 0.1
 
 
 ABSENT_S: Final = 0.1
-"""Time for which a measurement may be no number; at least three frames."""
-AGAIN: Final = 5
-AGAIN_SHARE: Final = 0.02
-"""Frames without a number, and their share, from which on they are told."""
+"""Time for which a measurement may be no number, without a break or in all; at least three periods."""
 GAP_ABSENT: Final = Fault(
     "gap absent",
     "it is no number any more, or below zero: check the encoder and the sign of the gap",
@@ -65,6 +52,10 @@ GAP_ABSENT: Final = Fault(
 EFFORT_ABSENT: Final = Fault(
     "effort absent",
     "the gripper does not tell its effort, so what follows from it is missing: check its current or load sensor",
+)
+PADS_ABSENT: Final = tuple(
+    Fault(f"{side} pad absent", "it gives no force: check the fingertip and its cable", ends=True)
+    for side in ("left", "right")
 )
 
 
@@ -76,10 +67,9 @@ class Reports:
         self._images_late_s = max(IMAGES_LATE / images_hz, IMAGES_LATE_S) if images_hz > 0.0 else 0.0
         self._stands = 0
         self._jump_s, self._jumped_s = max(JUMP_S, 5.0 / rate_hz), 0.0
-        self._frames = self._block_frames = 0
-        self._expected = self._block_s = 0.0
+        self._closing_s = self._block_s = 0.0
+        self._block_frames = 0
         self._block = max(FEWEST, SURPLUS_S * rate_hz)
-        self._singly_lost = 0
         self._closing = False
         self._counter = -1
         self._image_t_s = nan
@@ -101,7 +91,7 @@ class Reports:
                 )
         # The frame that ends the hold ends it because of the jump.
         closed, self._closing = self._closing, closing
-        if (closing or closed) and self._frames and not -self._period_s < frame.dt_s < self._jump_s:
+        if (closing or closed) and self._closing_s and not -self._period_s < frame.dt_s < self._jump_s:
             return self._jumped(frame.dt_s)
         if pads.counter != self._counter or self._image_t_s != self._image_t_s:
             self._counter, self._image_t_s = pads.counter, frame.t_s
@@ -112,7 +102,7 @@ class Reports:
                 "cables of the fingertips",
                 ends=True,
             )
-        return self._lost(frame.dt_s) if closing else None
+        return self._slow(frame.dt_s) if closing else None
 
     def _jumped(self, dt_s: float) -> Fault:
         self._jumped_s += max(dt_s, 0.0)
@@ -121,32 +111,12 @@ class Reports:
             f"the time of the gripper changed by {dt_s:+.2f} s from a frame to the next: its clock jumped, or this "
             "computer or the connection stood still, so that times and rates are wrong; check the connection and the "
             "load of this computer",
-            ends=self._jumped_s >= ENDS_SHARE * (self._jumped_s + self._expected * self._period_s),
-        )
-
-    def _lost(self, dt_s: float) -> Fault | None:
-        self._frames += 1
-        self._expected += dt_s / self._period_s
-        self._singly_lost += max(round(dt_s / self._period_s) - 1, 0)
-        lost = self._expected - self._frames
-        if (slow := self._slow(dt_s)) is not None:
-            return slow
-        if self._expected < FEWEST:
-            lost = self._singly_lost
-            few = lost < max(SINGLE_GAPS, SINGLE_SHARE * self._expected)
-            if self._expected * self._period_s < SLOW_S or few:
-                return None
-        elif lost < LOST_SHARE * self._expected:
-            return None
-        return Fault(
-            "frames lost",
-            f"{lost / self._expected * 100:.0f} % of the frames are missing, of {1.0 / self._period_s:.4g} a second: "
-            "rates and times are less exact; check the connection, the load of this computer and the declared rate",
-            ends=lost >= ENDS_SHARE * self._expected,
+            ends=self._jumped_s >= ENDS_SHARE * (self._jumped_s + self._closing_s),
         )
 
     def _slow(self, dt_s: float) -> Fault | None:
         """Compare each block of frames with the time that it took by the clock of the gripper."""
+        self._closing_s += dt_s
         self._block_frames += 1
         self._block_s += dt_s
         frames, block_s = self._block_frames, self._block_s
@@ -253,7 +223,7 @@ class StatusWatch:
 
 
 class Absence:
-    """Watches one measurement of frames with this rate (Hz), whose absence is this fault. Infinity is absence too.
+    """Watches one measurement with this rate (Hz), whose absence is this fault. Infinity is absence too.
 
     One that is not `expected` is missed only after it was there.
     """
@@ -261,8 +231,7 @@ class Absence:
     def __init__(self, fault: Fault, rate_hz: float, *, expected: bool) -> None:
         self._fault, self._expected = fault, expected
         self._allowed_s = max(ABSENT_S, 3.0 / rate_hz)
-        self._known_s = nan
-        self._frames = self._absent = 0
+        self._absent_s = self._all_absent_s = 0.0
 
     def see(self, value: float, frame: Frame) -> Fault | None:
         """Take the value of the measurement in this frame; return the fault once it has been no number for too long.
@@ -270,17 +239,16 @@ class Absence:
         One that is no number again and again has the fault too, which then does not end the grasp.
         """
         is_known = isfinite(value)
-        if is_known or (self._expected and self._known_s != self._known_s):
-            self._known_s = frame.t_s
-        if frame.t_s - self._known_s > self._allowed_s:
+        self._expected = self._expected or is_known
+        missing_s = 0.0 if is_known or not self._expected else frame.dt_s
+        self._all_absent_s += missing_s
+        self._absent_s = self._absent_s + missing_s if not is_known else 0.0
+        if self._absent_s > self._allowed_s:
             return self._fault
-        if self._known_s == self._known_s:
-            self._frames += 1
-            self._absent += not is_known
-        if is_known or self._absent < max(AGAIN, AGAIN_SHARE * self._frames):
+        if is_known or self._all_absent_s <= self._allowed_s:
             return None
         return Fault(
             self._fault.name,
-            f"{self._absent} of {self._frames} frames do not tell it, so that what follows from it is wrong or "
+            f"it was no number for {self._all_absent_s:.2f} s in all, so that what follows from it is wrong or "
             "missing: check its sensor and the connection",
         )

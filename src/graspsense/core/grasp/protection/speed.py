@@ -44,6 +44,8 @@ FEW_JUMPS: Final = 4
 
 FAST: Final = 1.5
 """Speed over the commanded one from which on the fingers are too fast; its inverse is too slow."""
+FAST_ENDS: Final = 2.0
+"""Speed over the commanded one that ends an approach: the fingers meet the object with four times the energy."""
 FAST_S: Final = 0.2
 """Time over which a speed that is too fast is taken; at least three frames."""
 BLOCK_S: Final = 0.3
@@ -101,31 +103,6 @@ class GapSpeed:
 def disagree(moved_m: float, said_m: float, share: float) -> bool:
     """Return whether two travels differ by more than this share of the larger one."""
     return abs(moved_m - said_m) > ALLOWED_M + share * max(abs(moved_m), abs(said_m))
-
-
-class Rush:
-    """Watches the speed of an approach in which nothing has been felt. `limit_m_s` is the limit of a first use."""
-
-    def __init__(self, limit_m_s: float, rate_hz: float) -> None:
-        self._limit_m_s, self._lasts_s = limit_m_s, max(RUSH_S, 3.0 / rate_hz)
-        self._since_s = nan
-
-    def see(self, frame: Frame) -> Fault | None:
-        """Take the frame of a tick of the approach, and return the fault if the fingers rush."""
-        if not -frame.velocity_m_s > RUSH * self._limit_m_s:
-            self._since_s = nan
-            return None
-        if self._since_s != self._since_s:
-            self._since_s = frame.t_s
-        if frame.t_s - self._since_s < self._lasts_s:
-            return None
-        return Fault(
-            "fingers rush",
-            f"they close at {-frame.velocity_m_s * 1e3:.0f} mm/s, and {self._limit_m_s * 1e3:.0f} mm/s are allowed "
-            "before a contact (run.first_speed_m_s): the gripper does not keep the speed of its commands, or "
-            "its gap is in another unit; send it a position or a velocity instead of an effort, and give metres",
-            ends=True,
-        )
 
 
 class Standstill:
@@ -212,10 +189,13 @@ class GapJump:
 class KeptSpeed:
     """Compares the way of the gap over the time with the commanded speed, for frames with this rate (Hz).
 
-    Fingers that have kept the speed once may become slower: they may press something.
+    Fingers that have kept the speed once may become slower: they may press something. Whatever they are commanded, they
+    rush in an approach well beyond `limit_m_s`, that of a first use.
     """
 
-    def __init__(self, rate_hz: float) -> None:
+    def __init__(self, rate_hz: float, limit_m_s: float = inf) -> None:
+        self._limit_m_s, self._rush_s = limit_m_s, 0.0
+        self._rush_lasts_s = max(RUSH_S, 3.0 / rate_hz)
         self._fast_s, self._block_s = max(FAST_S, 3.0 / rate_hz), max(BLOCK_S, 4.0 / rate_hz)
         self._told_m_s = 0.0
         self._recent: deque[tuple[float, float]] = deque()
@@ -233,7 +213,17 @@ class KeptSpeed:
             self._too_fast_s, self._block_t_s = 0.0, nan
 
     def see(self, frame: Frame, phase: int) -> Fault | None:
-        """Take the frame of a tick of the approach or the release."""
+        """Take the frame of a tick of the release, or of an approach in which nothing has been felt."""
+        rushes = phase == APPROACH and -frame.velocity_m_s > RUSH * self._limit_m_s
+        self._rush_s = self._rush_s + frame.dt_s if rushes else 0.0
+        if self._rush_s > self._rush_lasts_s:
+            return Fault(
+                "fingers rush",
+                f"they close at {-frame.velocity_m_s * 1e3:.0f} mm/s, and {self._limit_m_s * 1e3:.0f} mm/s are allowed "
+                "before a contact (run.first_speed_m_s): the gripper does not keep the speed of its commands, or "
+                "its gap is in another unit; send it a position or a velocity instead of an effort, and give metres",
+                ends=True,
+            )
         told_m_s = self._told_m_s
         if not 0.0 < abs(told_m_s) < inf:
             return None
@@ -250,7 +240,7 @@ class KeptSpeed:
         )
         self._too_fast_s = self._too_fast_s + frame.dt_s if too_fast else 0.0
         if self._too_fast_s > LASTS_S:
-            return self._not_kept(speed_m_s)
+            return self._not_kept(speed_m_s, ends=speed_m_s > FAST_ENDS * abs(told_m_s))
         return self._slow(frame) if phase == APPROACH and told_m_s > 0.0 and not self._kept else None
 
     def _slow(self, frame: Frame) -> Fault | None:
@@ -271,12 +261,13 @@ class KeptSpeed:
             return None
         return self._not_kept(speed_m_s)
 
-    def _not_kept(self, speed_m_s: float) -> Fault:
+    def _not_kept(self, speed_m_s: float, *, ends: bool = False) -> Fault:
         return Fault(
             "not the commanded speed",
             f"the fingers move at {speed_m_s * 1e3:.0f} mm/s by gap and time, and were told "
             f"{abs(self._told_m_s) * 1e3:.0f} mm/s: the scale of the gap or the clock is wrong, or the motor cannot; "
             "gaps and times can be off as much; check the encoder, the clock and the supply",
+            ends=ends,
         )
 
 

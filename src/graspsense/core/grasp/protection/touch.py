@@ -41,9 +41,6 @@ MOST_S: Final = 3.0
 """Bounds of the time that stands for this travel, for fast and for slow approaches."""
 MOST_PUSHED_S: Final = 15.0
 """The longest time for which one pad may push an object."""
-ABSENT_S: Final = 0.1
-"""Time for which the force of a pad may be no number while the fingers close, without a break or in all; at least
-three periods of the pads."""
 CLAIM_PERIODS: Final = 2.0
 """Periods of the pads for which a contact may lack a witness."""
 USUAL_M_S: Final = 0.010
@@ -61,7 +58,8 @@ SLOWED_SHARE: Final = 0.7
 SMOOTHING_S: Final = 0.2
 """Time constant of the means of effort and speed over the approach."""
 SPEED_SMOOTHING_S: Final = 0.01
-"""Time constant of the present speed, several steps of an encoder."""
+SPEED_PERIODS: Final = 10.0
+"""Time constant of the present speed, at least so many periods of the frames: several steps of an encoder."""
 NEEDED_MARGIN: Final = 1.25
 NEEDED_CONTACTS: Final = 2.0
 """By how much the effort may exceed the mean effort of the approach while a contact is not clear: by a quarter, and by
@@ -78,8 +76,6 @@ class Pad:
         self._free_gap_m = self._free_t_s = self._free_n = nan
         self.first_n = nan
         """The force of the first tick."""
-        self.absent_s = self.all_absent_s = 0.0
-        """Time (s) without a number, without a break and in all."""
         self.sharp = False
         """Whether the force rose by most of the contact force within a short travel and time, and is there yet."""
 
@@ -106,7 +102,8 @@ class Touch:
     """Watches both pads against the motion of the fingers, from the approach to the hold.
 
     `usual_effort_n` limits a contact that is not clear where the approach has shown no effort. `pads_hz` is the rate of
-    the forces of the pads, 0 if it is not known. `on_some_cells` returns whether both forces rose on some cells only.
+    the forces of the pads, 0 if it is not known, and `rate_hz` that of the frames. `on_some_cells` returns whether both
+    forces rose on some cells only.
     """
 
     def __init__(
@@ -115,16 +112,16 @@ class Touch:
         usual_effort_n: float = inf,
         pads_hz: float = 0.0,
         on_some_cells: Callable[[], bool] = lambda: False,
+        rate_hz: float = inf,
     ) -> None:
         self._contact_n, self._usual_n = contact_force_n, usual_effort_n
         self._on_some_cells = on_some_cells
-        self._absent_s = max(ABSENT_S, 3.0 / pads_hz) if pads_hz > 0.0 else ABSENT_S
         self._images_s = CLAIM_PERIODS / pads_hz if pads_hz > 0.0 else 0.0
         self._left, self._right = Pad(contact_force_n), Pad(contact_force_n)
         self._ever_felt = False
         self._gap_m = nan
         self._needed_n, self._approach_m_s = RecentMean(SMOOTHING_S), RecentMean(SMOOTHING_S)
-        self._speed_m_s = RecentMean(SPEED_SMOOTHING_S)
+        self._speed_m_s = RecentMean(max(SPEED_SMOOTHING_S, SPEED_PERIODS / rate_hz))
         self._start_gap_m = nan
         self._alone_t_s = self._alone_gap_m = nan
         self._moved_t_s = self._moved_gap_m = nan
@@ -163,18 +160,6 @@ class Touch:
     def free(self) -> bool:
         """Whether neither pad feels anything."""
         return not (self._left.felt or self._right.felt)
-
-    def absent(self, frame: Frame) -> list[Fault]:
-        """Take the frame of a tick that was seen while the fingers close or hold; return the pads without a force."""
-        faults = []
-        for side, pad in (("left", self._left), ("right", self._right)):
-            absent = pad.force_n != pad.force_n
-            pad.absent_s = pad.absent_s + frame.dt_s if absent else 0.0
-            pad.all_absent_s += frame.dt_s * absent
-            if pad.all_absent_s > self._absent_s:
-                why = "it gives no force: check the fingertip and its cable"
-                faults.append(Fault(f"{side} pad absent", why, ends=pad.absent_s > self._absent_s))
-        return faults
 
     def _approached(self, frame: Frame, asked: Command) -> None:
         """Learn the speed and the effort of the approach, while the fingers move and neither pad feels."""
