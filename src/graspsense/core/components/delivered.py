@@ -13,10 +13,11 @@ from graspsense.core.components.channels import (
     declared_dtype,
     declared_shape,
     dtype_of,
+    fingertips,
     further,
     shape_of,
 )
-from graspsense.core.values.channel import FLOATS, Channel, TactileArray
+from graspsense.core.values.channel import FLOATS, Channel
 from graspsense.core.values.signals import Frame, Image, Pads, Reading, Samples
 
 _FRAME: Final = struct.Struct(f"<{len(Frame._fields) - 1}dq")
@@ -32,12 +33,8 @@ class Delivered:
         }
         self._declared = tuple(self._forms)
         self._names: tuple[str, ...] | None = None
-        arrays = [
-            channel.cells
-            for channel in channels
-            if channel.name == "pads" and isinstance(channel, TactileArray)
-        ]
-        self._cells = arrays[0] if arrays else None
+        pads = fingertips(channels)
+        self._cells = pads.cells if pads else None
         self._pads: Pads | None = None
         self._counter = 0
         self._signals: Any = ()
