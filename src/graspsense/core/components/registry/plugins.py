@@ -272,7 +272,11 @@ class Plugins:
             if kind.hook in calls.hooks
             for entry in calls.entries(kind.hook, kind.entry)
         ]
-        _check_distinct([*self._parts, *parts])
+        declared = {(part.kind, part.qualified) for part in self._parts}
+        for part in parts:
+            if (part.kind, part.qualified) in declared:
+                raise PluginRefused(f"{part.distribution} declares {part.kind} {part.name!r} twice")
+            declared.add((part.kind, part.qualified))
         return calls, parts
 
     def _implementing(self, hook: str) -> Iterator[tuple[PluginStatus, HookCalls]]:
@@ -380,12 +384,3 @@ def _status(
     source: PluginSource, state: Literal["loaded", "disabled", "broken"], reason: str = ""
 ) -> PluginStatus:
     return PluginStatus(source.distribution, source.version, source.entry_point, source.module, state, reason)
-
-
-def _check_distinct(parts: Sequence[Component | Resource[Any]]) -> None:
-    """Refuse a second part of one kind and one qualified name. Raises PluginRefused."""
-    seen = set()
-    for part in parts:
-        if (part.kind, part.qualified) in seen:
-            raise PluginRefused(f"{part.distribution} declares {part.kind} {part.name!r} twice")
-        seen.add((part.kind, part.qualified))
