@@ -238,7 +238,7 @@ measuring("extracts-in-time", "with whole columns", lambda peak, trace: time.sle
 measuring(
     "requires-what-it-reads",
     "add the channels that it reads to `requires`",
-    lambda peak, trace: peak + float(np.nansum(trace.force_right_n)),
+    lambda peak, trace: peak + float(np.nansum(trace.force_right_n)) / max(len(trace), 1),
 )
 measuring(
     "independent-of-the-start-of-the-clock",

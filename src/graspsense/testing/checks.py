@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import locale
-import logging
 import os
 import random
 import signal
 import threading
-import time
-import warnings
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, redirect_stdout
@@ -153,10 +150,6 @@ def leaving_no_thread(doing: str) -> Iterator[None]:
     demand_ended(more, f"one more each time {doing}: end it with the call, or in `close`")
 
 
-_ALL_IGNORED: Final = ("ignore", None, Warning, None, 0)
-"""The filter that hides all warnings; others are added by libraries as they are imported."""
-
-
 def _process_state() -> dict[str, Any]:
     return {
         "the working folder": os.getcwd(),
@@ -165,9 +158,6 @@ def _process_state() -> dict[str, Any]:
         "np.seterr": np.geterr(),
         "the random numbers of numpy": repr(np.random.get_state()),  # noqa: NPY002 (that others draw)
         "the random numbers of Python": random.getstate(),
-        "the time zone": time.tzname,
-        "which messages of logging are shown": logging.root.manager.disable,
-        "which warnings are shown": _ALL_IGNORED in warnings.filters,
     }
 
 

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import json
 import os
-import pickle
 import subprocess
 import sys
 from collections.abc import Callable, Mapping
 from functools import cached_property
+from importlib import import_module
 from typing import Any
 
-from attrs import define, field
+from attrs import asdict, define, field
 
+from graspsense.core.components.channels import as_json, from_json
+from graspsense.core.components.entries import ROLES, Role
 from graspsense.core.components.registry import Component, Plugins, PluginStatus, Resource, canonical
 from graspsense.core.settings.selected import build
 from graspsense.testing.checks import CheckFailed
@@ -88,12 +91,24 @@ class Package:
 def elsewhere(subject: Subject, what: Callable[[Subject], str]) -> str:
     """Return what a module function gives in a fresh interpreter, at another time of the day and of other hashes."""
     code = (
-        "import pickle, sys; sys.path[:] = pickle.load(sys.stdin.buffer)"
-        "; what, subject = pickle.load(sys.stdin.buffer); print('\\n' + what(subject))"
+        "import json, sys; given = json.load(sys.stdin); sys.path[:] = given.pop('path')"
+        "; from graspsense.testing.subject import answer; print('\\n' + answer(**given))"
     )
-    asked = what, Subject(component=subject.component, keys=dict(subject.keys))
-    given = pickle.dumps(sys.path) + pickle.dumps(asked)
-    return printed_afresh(code, given=given, PYTHONHASHSEED="77", TZ="ELSEWHERE-13")
+    entry = asdict(subject.entry, recurse=False)
+    if "requires" in entry:  # of a feature set, whose features are not asked for
+        entry |= {"requires": [*map(as_json, entry["requires"])], "features": ()}
+    given = {"role": subject.role, "entry": entry, "keys": dict(subject.keys), "path": sys.path}
+    given |= {"module": what.__module__, "name": what.__name__}
+    return printed_afresh(code, given=json.dumps(given).encode(), PYTHONHASHSEED="77", TZ="ELSEWHERE-13")
+
+
+def answer(role: Role, entry: dict[str, Any], keys: Mapping[str, Any], module: str, name: str) -> str:
+    """Return what `elsewhere` was asked for; it made the arguments."""
+    if "requires" in entry:
+        entry |= {"requires": tuple(map(from_json, entry["requires"])), "features": ()}
+    component = Component(ROLES[role].entry(**entry), "elsewhere", "0")
+    text: str = getattr(import_module(module), name)(Subject(component=component, keys=keys))
+    return text
 
 
 def printed_afresh(code: str, *, given: bytes = b"", **environ: str) -> str:

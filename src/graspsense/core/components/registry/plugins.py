@@ -112,8 +112,7 @@ class Plugins:
     def components(self, role: Role | None = None) -> tuple[Component, ...]:
         """Return the components of this role, or all, in the order of role and name."""
         order = list(ROLES)
-        components = (part for part in self._parts if isinstance(part, Component))
-        of_role = (part for part in components if role in (None, part.role))
+        of_role = (part for part in self._parts if isinstance(part, Component) and role in (None, part.role))
         return tuple(sorted(of_role, key=lambda part: (order.index(part.role), part.name, part.distribution)))
 
     def feature_sets(self) -> tuple[FeatureSetEntry, ...]:
