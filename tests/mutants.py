@@ -238,7 +238,7 @@ measuring("extracts-in-time", "with whole columns", lambda peak, trace: time.sle
 measuring(
     "requires-what-it-reads",
     "add the channels that it reads to `requires`",
-    lambda peak, trace: peak + float(np.nansum(trace.force_right_n)),
+    lambda peak, trace: peak + float(np.nansum(trace.force_right_n)) / max(len(trace), 1),
 )
 measuring(
     "independent-of-the-start-of-the-clock",
@@ -316,7 +316,7 @@ featuring(
 )
 featuring(
     "times-are-those-of-the-clock",
-    "not from the number of ticks",
+    "take times from `trace.t_s`",
     entry={"features": (Feature("peak", "s", "time of the force"),)},
     units=("s",),
     values=lambda features, trace: (0.002 * np.count_nonzero(trace.force_left_n > 1.0),),
@@ -326,6 +326,28 @@ measuring(
     "add the channels that it reads",
     lambda value, trace: float(np.fmax(trace.force_left_n, trace.force_right_n).max()),
 )
+
+
+measuring(
+    "times-are-those-of-the-clock",
+    "means in place of sums",
+    lambda value, trace: float(np.nansum(trace.force_left_n)),
+)
+
+
+class Foreseeing(Peak):
+    """What it said of a longer part of the same grasp it says of a shorter one, too."""
+
+    said: tuple[int, Any] = (0, None)
+
+    def extract(self, trace):
+        features = super().extract(trace)
+        if len(trace) > Foreseeing.said[0]:
+            Foreseeing.said = len(trace), features
+        return Foreseeing.said[1] or features
+
+
+mutant("same-features-elsewhere", "nothing of the grasps before")(Foreseeing)
 
 
 # Controllers.
@@ -405,6 +427,31 @@ leaving(
     "independent-of-the-start-of-the-clock",
     "use differences of times",
     outcome=lambda after, frame: after.outcome or (STEADY if frame.t_s > 1000.0 else 0),
+)
+leaving(
+    "ends-every-grasp",
+    "hold only what was touched",
+    outcome=lambda after, frame: STEADY if frame.t_s > 0.1 else after.outcome,
+    phase=lambda after, frame: HOLD if frame.t_s > 0.1 else after.phase,
+)
+
+
+class Ticking(NamedTuple):
+    phase: int
+    outcome: int
+    ticks: int
+
+
+def ticking_step(params, state, reading):
+    outcome = STEADY if state.ticks >= 1500 else state.outcome
+    return Command(VELOCITY, -0.03, 12.0, inf), Ticking(state.phase, outcome, state.ticks + 1)
+
+
+law(
+    "times-are-those-of-the-clock",
+    "not ticks",
+    init=lambda self: Ticking(APPROACH, 0, 0),
+    step=staticmethod(ticking_step),
 )
 commanding(
     "requires-what-it-reads",
@@ -972,6 +1019,16 @@ nearest(
     "separates-separable-trials",
     "is the order of `classes`",
     classes=lambda self: Nearest.classes(self)[::-1],
+)
+nearest(
+    "separates-separable-trials",
+    "both of two labels",
+    classes=lambda self: Nearest.classes(self)[:: -1 if len(Nearest.classes(self)) == 2 else 1],
+)
+nearest(
+    "separates-separable-trials",
+    "with their signs",
+    fit=lambda self, table, labels, seed: Nearest.fit(self, table.columns(table.names[:4]), labels, seed),
 )
 mutant("same-seed-same-model", "draw everything from the seed")(Dicing)
 nearest(

@@ -133,6 +133,7 @@ MUTANTS = [
     ("everything-declared-loads", {"plugin": SOUND + MEASURING}, "has no source and no simulated"),
     ("names-are-unique", changed(SOUND, '"summit"', '"chitta"'), "'chitta' is taken by graspsense/chitta"),
     (UNCHANGED, changed(SOUND, OBSERVING, 'run.labels["object"] = "mine"'), "changed its arguments"),
+    (UNCHANGED, changed(SOUND, OBSERVING, "trial.trace.force_left_n[:] = 0.0"), "changed its arguments"),
     (UNCHANGED, changed(SOUND, OBSERVING, "run.nothing"), "catch what may go wrong"),
     (UNCHANGED, changed(SOUND, OBSERVING, "return 1"), "an observer returns nothing"),
     ("probe-returns-in-time", changed(SOUND, "return []", "raise OSError('no bus')"), "OSError: no bus"),

@@ -15,6 +15,7 @@ import click
 from graspsense.cli.options import option_group, pipeline_options, settings_of
 from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import Subcommands, echo, echo_table, talk
+from graspsense.core.components.channels import fingertips
 from graspsense.core.grasp import calibration
 from graspsense.core.grasp.calibrating import Rig, breakaways, unloaded_images
 from graspsense.core.grasp.calibration import counts_per_newton, load_table, motor_table
@@ -236,10 +237,10 @@ def _first_facing(setup: _Setup) -> int:
 
 def _fingertips(setup: _Setup) -> TactileArray:
     """Return the declared array of the fingertips. Raises ConfigError."""
-    for channel in setup.backend.channels:
-        if channel.name == "pads" and isinstance(channel, TactileArray):
-            return channel
-    raise ConfigError(f"{setup.info.name} does not declare the cells of its fingertips")
+    pads = fingertips(setup.backend.channels)
+    if pads is None:
+        raise ConfigError(f"{setup.info.name} does not declare the cells of its fingertips")
+    return pads
 
 
 def _counts_per_n(setup: _Setup) -> float:

@@ -16,10 +16,10 @@ from typing import Any, Final, Literal, TypeVar, get_args
 from attrs import evolve, field, frozen
 
 from graspsense import __version__
-from graspsense.core.components.channels import as_json, from_json, further
+from graspsense.core.components.channels import as_json, fingertips, from_json, further
 from graspsense.core.files.toml_text import toml_lines, toml_values
 from graspsense.core.settings.resolved import Settings
-from graspsense.core.values.channel import Channel, TactileArray
+from graspsense.core.values.channel import Channel
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import DataDamaged
 from graspsense.core.values.features import Features
@@ -66,11 +66,8 @@ class DeviceRecord:
     def described(cls, device: DeviceInfo) -> DeviceRecord:
         """Return the record of an open gripper."""
         values = {name: getattr(device, name) for name in cls.__annotations__}
-        arrays = tuple(
-            channel
-            for channel in device.channels
-            if isinstance(channel, TactileArray) and channel.name == "pads"
-        )
+        pads = fingertips(device.channels)
+        arrays = () if pads is None else (pads,)
         return cls(**{**values, "channels": (*arrays, *further(device.channels))})
 
     @property

@@ -19,7 +19,7 @@ from graspsense import __version__
 from graspsense.core.components.entries import TABLE_OF_ROLE
 from graspsense.core.components.firstparty import DISTRIBUTION, EXAMPLES, SHIPPED
 from graspsense.core.components.hookspecs import API
-from graspsense.core.components.registry import Component, canonical, installed, installed_sources
+from graspsense.core.components.registry import canonical, installed, installed_sources
 from graspsense.core.values.errors import ConfigError, suggestion
 
 
@@ -91,8 +91,9 @@ def make(name: str, roles: Sequence[str], folder: Path) -> list[str]:
     check_name(name)
     part = name.removeprefix("graspsense-")
     _check_importable(name)
-    for component in _components(kinds, part):
-        if component.distribution != name:
+    for component in installed().components():
+        taken = component.role in kinds and component.name == part
+        if taken and component.distribution != name:
             raise ConfigError(
                 f"the {component.kind} name {part!r} is taken by {component.qualified}: choose another name"
             )
@@ -276,15 +277,6 @@ def _check_importable(name: str) -> None:
             f"the name {name!r} is taken: {others[0]} has a package {package}, which this one would hide. Choose "
             f"another name, as lab-{name}"
         )
-
-
-def _components(kinds: Mapping[str, ScaffoldKind], part: str) -> list[Component]:
-    """Return the installed components of these roles that have this name."""
-    return [
-        component
-        for component in installed().components()
-        if component.role in kinds and component.name == part
-    ]
 
 
 def _compatible(version: str) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import time
 from contextlib import closing, nullcontext, suppress
-from math import isfinite, isnan, nan
+from math import ceil, isfinite, isnan, nan
 from statistics import fmean, median
 from typing import Any, Final
 
@@ -24,7 +24,6 @@ from graspsense.core.values.signals import (
     Command,
     Frame,
     Outcome,
-    Pads,
 )
 from graspsense.testing.checks import (
     CheckFailed,
@@ -35,13 +34,14 @@ from graspsense.testing.checks import (
     raises_nothing,
 )
 from graspsense.testing.laws import EFFORT_N, FORCE_N, REST_S, GentleController, kind_of
-from graspsense.testing.session import TIMEOUT_S, description, next_reading, opened, readings_of
+from graspsense.testing.session import TIMEOUT_S, Session, description, next_reading, opened, readings_of, use
 from graspsense.testing.subject import Subject
 
 GRACE_S: Final = 1.0
 """Time (s) by which a busy machine may exceed a time-out."""
 VANISHING_S: Final = 2.0
 LONGEST_OPEN_S: Final = 10.0
+TARE_TICKS: Final = 20
 
 
 def describes_itself(subject: Subject) -> None:
@@ -107,26 +107,18 @@ def pads_can_be_zeroed(subject: Subject) -> None:
             suppress(TareRefused),
         ):
             backend.tare([])
-        images: list[Pads] = []
-        for _ in range(int(5.0 * info.rate_hz)):
-            reading = next_reading(backend)
-            newest = images[-1].counter if images else 0
-            if reading is not None and reading.pads.counter > newest:
-                images.append(reading.pads)
-            backend.apply(info.relaxed)
-            if len(images) >= info.tare_images:
-                break
+        session = Session(info, opened_s=0.0)
+        for _ in range(ceil(5.0 * info.rate_hz / TARE_TICKS)):
+            if len(session.images) < info.tare_images:
+                use(session, backend, "unloaded", TARE_TICKS, info.relaxed)
         demand(
-            len(images) >= info.tare_images,
-            f"{len(images)} images came in 5 s, a tare needs {info.tare_images}",
+            len(session.images) >= info.tare_images,
+            f"{len(session.images)} images came in 5 s, a tare needs {info.tare_images}",
         )
-        backend.tare(images)
-        forces = []
-        for _ in range(20):
-            reading = next_reading(backend)
-            backend.apply(info.relaxed)
-            if reading is not None:
-                forces += [reading.frame.force_left_n, reading.frame.force_right_n]
+        backend.tare(session.images[: info.tare_images])
+        use(session, backend, "tared", TARE_TICKS, info.relaxed)
+        tared = [reading.frame for reading in session.stages["tared"]]
+        forces = [force for frame in tared for force in (frame.force_left_n, frame.force_right_n)]
         known = [force for force in forces if not isnan(force)]
         demand(
             bool(known) and abs(fmean(known)) < 0.6,

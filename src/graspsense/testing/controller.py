@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import cache
 from math import inf, isfinite
@@ -37,11 +37,11 @@ from graspsense.core.values.signals import (
     Reading,
     no_pads,
 )
-from graspsense.testing.checks import CheckFailed, demand, raises_nothing
-from graspsense.testing.model_gripper import CELLS, OBJECTS, model_gripper
+from graspsense.testing.checks import CheckFailed, CheckSkipped, demand, raises_nothing
+from graspsense.testing.model_gripper import CELLS, DT_S, OBJECTS, model_gripper
 from graspsense.testing.subject import Subject
 
-TICKS: Final = 4000
+LONGEST_TRIED_S: Final = 4.0
 LONGEST_S: Final = 60.0
 GREATEST: Final = {VELOCITY: 5.0, POSITION: 0.5}
 """The greatest rate of a gap (m/s) and the greatest gap (m) that make sense."""
@@ -49,6 +49,8 @@ LATE_S: Final = 4096.0
 """The time at the first tick of a gripper whose clock has run for an hour."""
 SAME_LENGTH: Final = 0.02
 """Relative difference in length of two grasps that differ by rounding."""
+ABOUT_AS_LONG: Final = 0.25
+"""The same where the gripper has another rate."""
 ASKED: Final = (
     *("asked_force_n", "gentlest_force_n", "asked_speed_m_s", "asked_step_m", "asked_interval_s"),
     "contact_force_n",
@@ -85,20 +87,20 @@ def fresh_ticks(
     object_name: str = "a soft object",
     channels: Any = None,
     from_tick: int = 0,
-    first_t_s: float = 0.0,
+    clock: Mapping[str, float] | None = None,
 ) -> list[Tick]:
-    """Return the same ticks as `ticks_of`, computed again, the first of them at the time `first_t_s`.
+    """Return the same ticks as `ticks_of`, computed again, with `clock` as the attributes of the model gripper's time.
 
     Before tick `from_tick`, if given, the state is rebuilt from plain numbers.
     """
     law = subject.create()
     step, params, state = type(law).step, law.params(), law.init()
     gripper = model_gripper(_all_channels(subject) if channels is None else channels, object_name)
-    gripper.first_t_s = first_t_s
+    vars(gripper).update(clock or {})
     gripper.open(0)
     gripper.tare([])
     ticks: list[Tick] = []
-    for k in range(TICKS):
+    for k in range(round(LONGEST_TRIED_S / gripper.dt_s)):
         if from_tick and k == from_tick:
             state, params = _made_again(state), _made_again(params)
         reading = gripper.read(0.1)
@@ -334,13 +336,34 @@ def requires_what_it_reads(subject: Subject) -> None:
 
 def independent_of_the_start_of_the_clock(subject: Subject) -> None:
     """On a gripper whose clock has run for an hour, a grasp takes as long and ends as on a new one."""
-    early, late = ticks_of(subject), fresh_ticks(subject, first_t_s=LATE_S)
+    _demand_as_long(
+        subject,
+        SAME_LENGTH,
+        "keep the time of the first frame in the state, and use differences of times",
+        first_t_s=LATE_S,
+    )
+
+
+def times_are_those_of_the_clock(subject: Subject) -> None:
+    """On a gripper with half the rate, a grasp takes about as long and ends as at the full rate."""
+    if any(channel.rate_hz > 0.5 / DT_S for channel in subject.entry.requires):
+        raise CheckSkipped("it needs a higher rate")
+    _demand_as_long(
+        subject, ABOUT_AS_LONG, "count seconds by `frame.dt_s` or `frame.t_s`, not ticks", dt_s=2.0 * DT_S
+    )
+
+
+def _demand_as_long(subject: Subject, most_change: float, advice: str, **clock: float) -> None:
+    """Raise CheckFailed unless a grasp on a gripper with another clock takes as long and ends as usual."""
+    usual, other = (
+        (ticks[-1].frame.t_s - ticks[0].frame.t_s, Outcome(ticks[-1].after.outcome).words)
+        for ticks in (ticks_of(subject), fresh_ticks(subject, clock=clock))
+    )
+    given = ", ".join(f"{name} = {value:g} s" for name, value in clock.items())
     demand(
-        abs(len(late) - len(early)) <= SAME_LENGTH * len(early)
-        and late[-1].after.outcome == early[-1].after.outcome,
-        f"a grasp whose first frame is of {LATE_S:g} s ends as {late[-1].after.outcome} after {len(late)} ticks, and "
-        f"one from 0 s on as {early[-1].after.outcome} after {len(early)}: keep the time of the first frame in the "
-        "state, and use differences of times",
+        abs(usual[0] - other[0]) <= most_change * usual[0] and usual[1] == other[1],
+        f"a grasp ends as {usual[1]} after {usual[0]:.2f} s, and with {given} as {other[1]} after {other[0]:.2f} s: "
+        f"{advice}",
     )
 
 
@@ -494,4 +517,10 @@ def ends_every_grasp(subject: Subject) -> None:
             grasp.outcome not in (Outcome.ABORTED, Outcome.DEVICE_LOST, Outcome.RUNNING),
             f"with {object_name} between the fingers the grasp ended as {grasp.outcome.words}: "
             f"{grasp.reason}. Let the state's `outcome` leave RUNNING, after {LONGEST_S:g} s at the latest",
+        )
+        closest_m, width_m = float(grasp.trace.gap_m.min()), OBJECTS[object_name][0]
+        demand(
+            grasp.outcome != Outcome.STEADY or closest_m < width_m,
+            f"with {object_name} between the fingers, {width_m * 1e3:g} mm wide, the grasp ended as steady, and the "
+            f"fingers came no closer than {closest_m * 1e3:.1f} mm: hold only what was touched",
         )

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from graspsense.core.components.channels import cells_of, declared_shape, further, no_signals
+from graspsense.core.components.channels import cells_of, declared_shape, fingertips, further, no_signals
 from graspsense.core.components.roles import Controller, SensorBackend
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.runner import Grasp, run_uninterrupted
@@ -50,6 +50,8 @@ class ModelGripper(SensorBackend[None]):
 
     first_t_s = 0.0
     """The time (s) of its first tick."""
+    dt_s = DT_S
+    """The time (s) from a tick to the next."""
 
     def __init__(self, channels: frozenset[str | Channel], width_m: float, stiffness_n_m: float) -> None:
         super().__init__(None)
@@ -57,12 +59,8 @@ class ModelGripper(SensorBackend[None]):
         names = {channel.name if isinstance(channel, Channel) else channel for channel in channels}
         self._absent = [field for field, name in CHANNEL_OF_FIELD.items() if name not in names]
         self._has_pads = "pads" in names
-        arrays = [
-            channel.cells
-            for channel in declared
-            if channel.name == "pads" and isinstance(channel, TactileArray)
-        ]
-        self._cells = arrays[0] if arrays else CELLS
+        pads = fingertips(declared)
+        self._cells = pads.cells if pads else CELLS
         self._further = tuple(sorted(further(declared), key=lambda channel: channel.name))
         self._signals = no_signals(self._further)
         self._width_m, self._stiffness_n_m = width_m, stiffness_n_m
@@ -77,7 +75,7 @@ class ModelGripper(SensorBackend[None]):
             name="model_gripper",
             clock="virtual",
             simulated=True,
-            rate_hz=1.0 / DT_S,
+            rate_hz=1.0 / self.dt_s,
             effort_limit_n=EFFORT_LIMIT_N,
             speed_limit_m_s=SPEED_LIMIT_M_S,
             opening=Command(VELOCITY, 0.05, inf, inf),
@@ -89,8 +87,8 @@ class ModelGripper(SensorBackend[None]):
         del timeout_s
         force = self._force()
         frame = Frame(
-            t_s=self.first_t_s + self._ticks * DT_S,
-            dt_s=DT_S,
+            t_s=self.first_t_s + self._ticks * self.dt_s,
+            dt_s=self.dt_s,
             gap_m=self._gap,
             velocity_m_s=self._speed,
             effort_n=self._effort,
@@ -131,8 +129,8 @@ class ModelGripper(SensorBackend[None]):
         if kind == EFFORT:
             self._effort = min(max(value, -most), most)
             push = force - self._effort - DAMPING_N_S_M * self._speed
-            moved = self._speed + push * DT_S / MASS_KG
-            slowed = FRICTION_N * DT_S / MASS_KG
+            moved = self._speed + push * self.dt_s / MASS_KG
+            slowed = FRICTION_N * self.dt_s / MASS_KG
             self._speed = 0.0 if abs(moved) <= slowed else moved - slowed * (1.0 if moved > 0.0 else -1.0)
         else:
             if kind == VELOCITY:
@@ -142,11 +140,11 @@ class ModelGripper(SensorBackend[None]):
             else:
                 assert kind == FORCE, f"{kind} is not a kind of command"
                 wanted = (force - value) / 2000.0
-            self._speed += (min(max(wanted, -top), top) - self._speed) * DT_S / FOLLOWING_S
+            self._speed += (min(max(wanted, -top), top) - self._speed) * self.dt_s / FOLLOWING_S
             self._effort = force
             if force >= most and self._speed < 0.0:
                 self._speed = 0.0
-        self._gap += self._speed * DT_S
+        self._gap += self._speed * self.dt_s
         if not 0.0 < self._gap < OPEN_M:
             self._gap, self._speed = min(max(self._gap, 0.0), OPEN_M), 0.0
 

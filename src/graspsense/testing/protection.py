@@ -14,7 +14,6 @@ from graspsense.core.grasp.protection.effort_ceiling import asked_effort_n, effo
 from graspsense.core.grasp.protection.touch import MOST_S
 from graspsense.core.grasp.runner import Grasp, run_grasp
 from graspsense.core.grasp.wrapped_gripper import WrappedGripper
-from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.signals import EFFORT, FORCE, Command, Outcome, Pads, Reading
 from graspsense.testing.checks import CheckSkipped, demand
 from graspsense.testing.laws import HOSTILE, GentleController, HostileController, kind_of
@@ -35,12 +34,6 @@ class Observed(WrappedGripper):
         self._silent = silent
         self._tared_t_s = self._t_s = nan
         self.commands: list[Command] = []
-        self.info: DeviceInfo | None = None
-
-    def open(self, seed: int) -> DeviceInfo:
-        """Open the gripper and keep its description."""
-        self.info = super().open(seed)
-        return self.info
 
     def read(self, timeout_s: float) -> Reading | None:
         """Return what the gripper measured, or what a silent pad and one that presses would."""
@@ -76,10 +69,10 @@ def _grasped(
     return gripper, run_grasp(gripper, controller, run)
 
 
-def _demand_released(gripper: Observed, what: str) -> None:
-    last, info = gripper.commands[-1], gripper.info
+def _demand_released(gripper: Observed, grasp: Grasp, what: str) -> None:
+    last = gripper.commands[-1]
     demand(
-        info is not None and last == info.relaxed,
+        last == grasp.device.relaxed,
         f"{what} left the command {last} in force: accept the relaxing command at any time",
     )
     demand(
@@ -132,7 +125,7 @@ def hostile_laws_stay_below_the_ceiling(subject: Subject) -> None:
                 command[:2] in own or effort_n <= ceiling_n,
                 f"a law that commands {name} by {KINDS[kind]} squeezed with {effort_n:g} N, {ceiling_n:g} N is allowed",
             )
-        _demand_released(gripper, f"a law that commands {name}")
+        _demand_released(gripper, grasp, f"a law that commands {name}")
 
 
 def a_silent_pad_ends_the_grasp(subject: Subject) -> None:
@@ -152,4 +145,4 @@ def a_silent_pad_ends_the_grasp(subject: Subject) -> None:
     demand(
         lasted_s < MOST_S + 1.0, f"the right pad pressed alone for {lasted_s:.1f} s before the fingers opened"
     )
-    _demand_released(gripper, "a grasp with a silent pad")
+    _demand_released(gripper, grasp, "a grasp with a silent pad")

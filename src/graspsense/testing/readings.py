@@ -199,16 +199,8 @@ def signals_have_no_gaps_or_repeats(subject: Subject) -> None:
                     all(isnan(number) for row in now.values[now.new :] for number in row),
                     f"{channel.name!r} has numbers behind its {now.new} new samples: they repeat old ones; give NaN",
                 )
-            else:
-                demand(
-                    came >= 0 and (came > 0 or _is_same(now, earlier)),
-                    f"an image of {channel.name!r} changes while its counter stays at {now.counter}: count up",
-                )
+            _demand_counted(channel.name, earlier, now)
             if came:
-                demand(
-                    now.t_s > earlier.t_s or earlier.counter == 0,
-                    f"{channel.name!r} goes from {earlier.t_s} to {now.t_s} s: what is new is later",
-                )
                 last_s = now.t_s
         first_s = next((value.t_s for value in values if value.counter), 0.0)
         if channel.rate_hz and last_s > first_s and taken > 10:
@@ -219,10 +211,24 @@ def signals_have_no_gaps_or_repeats(subject: Subject) -> None:
             )
 
 
-def _is_same(now: Image, earlier: Image) -> bool:
-    if dtype_of(now) == FLOATS:
+def _demand_counted(name: str, earlier: Any, now: Any) -> None:
+    """Raise CheckFailed unless what has another number comes later, and an image with the same number is the same."""
+    came = now.counter - earlier.counter
+    demand(
+        came != 0 or isinstance(now, Samples) or _is_same(now, earlier),
+        f"an image of {name!r} changes while its counter stays at {now.counter}: count up with each new image",
+    )
+    demand(
+        came == 0 or (came > 0 and (now.t_s > earlier.t_s or earlier.counter == 0)),
+        f"{name!r} goes from number {earlier.counter} of {earlier.t_s} s to {now.counter} of {now.t_s} s: count up by "
+        "one, and what is new is later",
+    )
+
+
+def _is_same(now: Image | Pads, earlier: Image | Pads) -> bool:
+    if isinstance(now, Pads) or dtype_of(now) == FLOATS:
         return repr(now) == repr(earlier)
-    return now[:2] == earlier[:2] and np.array_equal(now.cells, earlier.cells, equal_nan=True)
+    return now[:2] == earlier[:2] and np.array_equal(now.cells, earlier.cells, equal_nan=True)  # type: ignore[union-attr]
 
 
 def channels_follow_from_the_settings(subject: Subject) -> None:
@@ -289,23 +295,15 @@ def rate_is_as_declared(subject: Subject) -> None:
 
 def images_count_up(subject: Subject) -> None:
     """The counter increases with each new image, by more where some were lost; no image is later than its frame."""
-    if not subject.session.images:
+    seen = [(frame, pads) for frame, pads, _ in subject.session.readings if pads.counter]
+    if not seen:
         raise CheckSkipped("this gripper has no cells")
-    for earlier, now in pairwise(subject.session.images):
+    for (_, earlier), (_, now) in pairwise(seen):
+        _demand_counted("pads", earlier, now)
+    for frame, pads in seen:
         demand(
-            now.counter > earlier.counter and now.t_s > earlier.t_s,
-            f"after image {earlier.counter} of {earlier.t_s} s comes image {now.counter} of {now.t_s} s: "
-            "count up by one",
-        )
-    shown: dict[int, Pads] = {}
-    for frame, pads, _ in subject.session.readings:
-        demand(
-            pads.counter == 0 or pads.t_s <= frame.t_s + 1e-9,
+            pads.t_s <= frame.t_s + 1e-9,
             f"the image of {pads.t_s} s comes with the frame of {frame.t_s} s: give the last image",
-        )
-        demand(
-            repr(shown.setdefault(pads.counter, pads)) == repr(pads),
-            f"image {pads.counter} changes while its counter stays: count up with each new image",
         )
 
 

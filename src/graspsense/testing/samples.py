@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from copy import deepcopy
 from math import nan
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from attrs import evolve, fields
-from numpy.typing import NDArray
 
 from graspsense.core.components.channels import further
 from graspsense.core.values.channel import Channel, FastChannel, TactileArray
@@ -124,8 +123,8 @@ def shifted(trace: Trace, seconds: float) -> Trace:
     )
 
 
-def arrays_of(trace: Trace) -> dict[str, NDArray[Any]]:
-    """Return the arrays of a trace, and of its further channels, by their names in it."""
+def contents_of(trace: Trace) -> dict[str, bytes]:
+    """Return the contents of the arrays of a trace, and of its further channels, by their names in it."""
     arrays = {field.name: getattr(trace, field.name) for field in fields(Trace)}
     for name, signal in trace.signals.items():
         arrays[f"signals[{name!r}]"] = signal
@@ -134,7 +133,7 @@ def arrays_of(trace: Trace) -> dict[str, NDArray[Any]]:
                 f"signals[{name!r}].{field.name}": getattr(signal, field.name)
                 for field in fields(type(signal))
             }
-    return {name: value for name, value in arrays.items() if isinstance(value, np.ndarray)}
+    return {name: value.tobytes() for name, value in arrays.items() if isinstance(value, np.ndarray)}
 
 
 def unusual_traces() -> dict[str, Trace]:

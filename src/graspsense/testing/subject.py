@@ -120,7 +120,7 @@ def printed_afresh(code: str, *, given: bytes = b"", **environ: str) -> str:
         capture_output=True,
         check=False,
     )
-    if ran.returncode:
+    if ran.returncode or not ran.stdout:
         failed = ran.stderr.decode(errors="replace").strip()[-300:]
         raise CheckFailed(f"it fails in a fresh interpreter: {failed}")
     return ran.stdout.decode().splitlines()[-1]

@@ -31,6 +31,12 @@ def further(channels: Iterable[Channel]) -> tuple[Channel, ...]:
     return tuple(channel for channel in channels if channel.name not in CHANNELS)
 
 
+def fingertips(channels: Iterable[Channel]) -> TactileArray | None:
+    """Return the array of the cells of both fingertips, None where the channels do not say which cells there are."""
+    pads = (channel for channel in channels if channel.name == "pads")
+    return next((channel for channel in pads if isinstance(channel, TactileArray)), None)
+
+
 def signal_type(channels: Iterable[Channel]) -> type[tuple[Any, ...]]:
     """Return the named tuple of the further ones of these channels, for `Reading.signals`.
 

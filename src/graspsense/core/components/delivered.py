@@ -13,10 +13,11 @@ from graspsense.core.components.channels import (
     declared_dtype,
     declared_shape,
     dtype_of,
+    fingertips,
     further,
     shape_of,
 )
-from graspsense.core.values.channel import FLOATS, Channel, TactileArray
+from graspsense.core.values.channel import FLOATS, Channel
 from graspsense.core.values.signals import Frame, Image, Pads, Reading, Samples
 
 _FRAME: Final = struct.Struct(f"<{len(Frame._fields) - 1}dq")
@@ -32,12 +33,8 @@ class Delivered:
         }
         self._declared = tuple(self._forms)
         self._names: tuple[str, ...] | None = None
-        arrays = [
-            channel.cells
-            for channel in channels
-            if channel.name == "pads" and isinstance(channel, TactileArray)
-        ]
-        self._cells = arrays[0] if arrays else None
+        pads = fingertips(channels)
+        self._cells = pads.cells if pads else None
         self._pads: Pads | None = None
         self._counter = 0
         self._signals: Any = ()
@@ -102,9 +99,9 @@ def _problem(value: Any, shape: tuple[int, ...], dtype: str) -> str:
     """Return what is wrong with the value of a channel that has this shape, and numbers of this type."""
     if dtype_of(value) != dtype:
         return f"has cells of type {dtype_of(value)} instead of {dtype}: convert them, or declare their dtype"
-    sized = _image_sized if isinstance(value, Image) else _sized
     if shape_of(value) != shape:
-        return f"has {sized(shape_of(value))} instead of {sized(shape)}"
+        given, wanted = (_sized(size, image=isinstance(value, Image)) for size in (shape_of(value), shape))
+        return f"has {given} instead of {wanted}"
     if isinstance(value, Image) and dtype != FLOATS:
         return _array_problem(value.cells)
     if isinstance(value, Image):
@@ -130,14 +127,10 @@ def _array_problem(cells: Any) -> str:
     return ""
 
 
-def _image_sized(shape: tuple[int, ...]) -> str:
-    return f"{shape[0]} cells" if len(shape) == 1 else f"the shape {' x '.join(map(str, shape))}"
-
-
-def _sized(shape: tuple[int, ...]) -> str:
-    if not shape:
-        return "one number"
-    return f"{shape[0]} cells" if len(shape) == 1 else f"{shape[0]} samples of {shape[1]} axes"
+def _sized(shape: tuple[int, ...], *, image: bool = False) -> str:
+    if len(shape) < 2:
+        return f"{shape[0]} cells" if shape else "one number"
+    return f"the shape {' x '.join(map(str, shape))}" if image else f"{shape[0]} samples of {shape[1]} axes"
 
 
 def _are_numbers(values: Iterable[Any]) -> bool:

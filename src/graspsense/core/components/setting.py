@@ -173,17 +173,14 @@ class _Limits(NamedTuple):
     @property
     def words(self) -> str:
         """The values that are allowed, in words; empty if all are."""
-        minimum, above, maximum, below = self
-        if minimum is not None and maximum is not None and not math.isinf(maximum):
-            return f"{minimum:g} to {maximum:g}"
-        most = "may be inf" if maximum == math.inf else None if maximum is None else f"at most {maximum:g}"
-        words = (
-            None if minimum is None else f"at least {minimum:g}",
-            None if above is None else f"above {above:g}",
-            most,
-            None if below is None else f"below {below:g}",
+        if self.minimum is not None and self.maximum is not None and not math.isinf(self.maximum):
+            return f"{self.minimum:g} to {self.maximum:g}"
+        given = zip(("at least", "above", "at most", "below"), self, strict=True)
+        return ", ".join(
+            "may be inf" if limit == math.inf else f"{words} {limit:g}"
+            for words, limit in given
+            if limit is not None
         )
-        return ", ".join(filter(None, words))
 
 
 def _is_number(value: Any) -> bool:

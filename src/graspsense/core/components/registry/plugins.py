@@ -22,10 +22,12 @@ from graspsense.core.components.entries import (
     RESOURCES,
     ROLES,
     TABLE_OF_ROLE,
+    ComponentKind,
     ExperimentKindEntry,
     FeatureSetEntry,
     Finding,
     FoundDevice,
+    ResourceKind,
     Role,
 )
 from graspsense.core.components.firstparty import provider
@@ -82,8 +84,7 @@ class Plugins:
         self._strict = environ.get(STRICT_VARIABLE) == "1"
         self._statuses: list[PluginStatus] = []
         self._loaded: list[tuple[PluginStatus, HookCalls]] = []
-        self._components: list[Component] = []
-        self._resources: list[Resource[Any]] = []
+        self._parts: list[Component | Resource[Any]] = []
         sources = list(sources)
         self.unknown_names = unknown_names({source.distribution for source in sources}, environ)
         """Distributions that an environment variable names and that are not installed, a sentence each."""
@@ -111,7 +112,7 @@ class Plugins:
     def components(self, role: Role | None = None) -> tuple[Component, ...]:
         """Return the components of this role, or all, in the order of role and name."""
         order = list(ROLES)
-        of_role = (part for part in self._components if role in (None, part.role))
+        of_role = (part for part in self._parts if isinstance(part, Component) and role in (None, part.role))
         return tuple(sorted(of_role, key=lambda part: (order.index(part.role), part.name, part.distribution)))
 
     def feature_sets(self) -> tuple[FeatureSetEntry, ...]:
@@ -138,7 +139,8 @@ class Plugins:
 
     def all_resources(self) -> tuple[Resource[Any], ...]:
         """Return the resources of every kind, in the order of the names."""
-        return tuple(sorted(self._resources, key=lambda resource: (resource.name, resource.distribution)))
+        resources = (part for part in self._parts if isinstance(part, Resource))
+        return tuple(sorted(resources, key=lambda resource: (resource.name, resource.distribution)))
 
     def resource(self, kind: type[EntryT], name: str, others: Iterable[str] = ()) -> Resource[EntryT]:
         """Return the resource of this kind with this short or qualified name.
@@ -153,7 +155,7 @@ class Plugins:
         known = sorted(
             {
                 *(status.distribution for status in self._statuses),
-                *(component.name for component in self._components),
+                *(component.name for component in self.components()),
             }
         )
         if name and any(distributions(name=name)):
@@ -230,7 +232,7 @@ class Plugins:
             with contextlib.redirect_stdout(sys.stderr):
                 plugin, cost = imported(source)
                 check_api(plugin, source)
-                calls, components, resources = self._registered(plugin, source)
+                calls, parts = self._registered(plugin, source)
         except KeyboardInterrupt:
             raise
         except BaseException as error:  # also that of a compiled extension which panics, and is no Exception
@@ -250,32 +252,31 @@ class Plugins:
         )
         self._statuses.append(status)
         self._loaded.append((status, calls))
-        self._components += components
-        self._resources += resources
+        self._parts += parts
 
     def _registered(
         self, plugin: object, source: PluginSource
-    ) -> tuple[HookCalls, list[Component], list[Resource[Any]]]:
+    ) -> tuple[HookCalls, list[Component | Resource[Any]]]:
         """Return the hooks of a plugin, and what it declares by them. Raises PluginRefused."""
         for _, known in self._loaded:
             if known.plugin is plugin:
                 raise PluginRefused(f"{source.module} is loaded already, as {known.name}")
         calls = HookCalls(plugin, source, self._trace)
-        components = [
-            Component(entry, source.distribution, source.version)
-            for kind in ROLES.values()
+        kinds: tuple[ComponentKind | ResourceKind, ...] = (*ROLES.values(), *RESOURCES)
+        parts: list[Component | Resource[Any]] = [
+            (Component if isinstance(kind, ComponentKind) else Resource)(
+                entry, source.distribution, source.version
+            )
+            for kind in kinds
             if kind.hook in calls.hooks
             for entry in calls.entries(kind.hook, kind.entry)
         ]
-        resources = [
-            Resource(entry, source.distribution, source.version)
-            for kind in RESOURCES
-            if kind.hook in calls.hooks
-            for entry in calls.entries(kind.hook, kind.entry)
-        ]
-        _check_distinct([*self._components, *components])
-        _check_distinct([*self._resources, *resources])
-        return calls, components, resources
+        declared = {(part.kind, part.qualified) for part in self._parts}
+        for part in parts:
+            if (part.kind, part.qualified) in declared:
+                raise PluginRefused(f"{part.distribution} declares {part.kind} {part.name!r} twice")
+            declared.add((part.kind, part.qualified))
+        return calls, parts
 
     def _implementing(self, hook: str) -> Iterator[tuple[PluginStatus, HookCalls]]:
         return ((status, calls) for status, calls in self._loaded if hook in calls.hooks)
@@ -382,12 +383,3 @@ def _status(
     source: PluginSource, state: Literal["loaded", "disabled", "broken"], reason: str = ""
 ) -> PluginStatus:
     return PluginStatus(source.distribution, source.version, source.entry_point, source.module, state, reason)
-
-
-def _check_distinct(parts: Sequence[Component | Resource[Any]]) -> None:
-    """Refuse a second part of one kind and one qualified name. Raises PluginRefused."""
-    seen = set()
-    for part in parts:
-        if (part.kind, part.qualified) in seen:
-            raise PluginRefused(f"{part.distribution} declares {part.kind} {part.name!r} twice")
-        seen.add((part.kind, part.qualified))
