@@ -265,6 +265,30 @@ def test_a_thing_that_is_squeezed_beside_what_measures_ends_the_grasp(grasped, t
     assert "no finger feels" in trial.reason
 
 
+FAR = "<body name='far' pos='0.5 0 0'><site name='far'/></body>"
+
+
+@every_case(
+    ("changed", "added", "widths"),
+    [
+        # Fingers that do not touch when they are closed, a geom with a margin, and a site of another gripper.
+        (
+            {"gap": '{ joint = "left", scale = -2.0, offset_m = 0.11 }'},
+            ("0.045", "0.038"),
+            ("60.", "40."),
+        ),
+        ({}, ('condim="4"', 'condim="4" margin="0.008"'), ("56", "40 mm")),
+        ({"gap": '{ sites = ["left_face", "far"] }'}, ("<worldbody>", f"<worldbody>{FAR}"), ("mm", "0 mm")),
+    ],
+)
+def test_a_gap_that_is_not_the_width_of_what_is_held_ends_the_grasp(
+    grasped, tmp_path, changed, added, widths
+):
+    trial = grasped(f"gripper.file={gripper_with(tmp_path, replaced(added), **changed)}")
+    assert trial.outcome.words == "device lost"
+    assert all(width in trial.reason for width in widths)
+
+
 @pytest.mark.parametrize("part", ["contact", "equality", "actuation"])
 def test_what_a_grasp_needs_is_there_though_the_model_switches_it_off(grasped, tmp_path, part):
     switched = replaced(('"implicitfast"/>', f'"implicitfast"><flag {part}="disable"/></option>'))

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Set
-from math import hypot, inf
+from collections.abc import Callable, Iterator, Set
+from math import hypot, inf, nan
 from typing import Any
 
 import mujoco
@@ -120,9 +120,16 @@ class ForceGauge:
 
     def _sums(self) -> tuple[float, float]:
         """Return the sums of the forces at the contacts of each finger."""
+        left = right = 0.0
+        for _, on_left, on_right in self._contacts():
+            left += on_left
+            right += on_right
+        return left, right
+
+    def _contacts(self) -> Iterator[tuple[int, float, float]]:
+        """Yield the number of each contact of a finger, and its force on the left and on the right one."""
         model, data, factors, roles, force = self._model, self._data, self._factors, self._roles, self._force
         contacts, rows = data.contact, None
-        left = right = 0.0
         for k, pair in enumerate(contacts.geom.tolist()):
             key = tuple(pair)
             signs = factors.get(key)
@@ -134,9 +141,23 @@ class ForceGauge:
                 rows = self._along_axis(contacts.frame)
             mujoco.mj_contactForce(model, data, k, self._wrench)
             along = rows[3 * k] * force[0] + rows[3 * k + 1] * force[1] + rows[3 * k + 2] * force[2]
-            left += signs[0] * along
-            right += signs[1] * along
-        return left, right
+            yield k, signs[0] * along, signs[1] * along
+
+    def held_m(self) -> float:
+        """Return how wide the thing is where both fingers press on it, or 0 where they press on each other.
+
+        NaN where one of them presses on nothing. With a margin, a thing is pressed before it is reached.
+        """
+        contact = self._data.contact
+        on_left, on_right, places_m = np.zeros(0), np.zeros(0), np.zeros(0)
+        pressed = list(self._contacts())
+        if pressed:
+            numbers, on_left, on_right = (np.array(column) for column in zip(*pressed, strict=True))
+            apart_m = np.maximum(contact.dist[numbers], 0.0)
+            places_m = contact.pos[numbers] @ self._axis - apart_m / 2.0 * np.sign(on_right - on_left)
+        if not (on_left.sum() > 0.0 and on_right.sum() > 0.0):
+            return nan
+        return float(np.average(places_m, weights=on_right) - np.average(places_m, weights=on_left))
 
     def squeeze_n(self) -> float:
         """Return the force that squeezes a thing along the closing direction, by whatever parts of the gripper move."""
