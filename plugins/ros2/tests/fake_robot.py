@@ -107,6 +107,8 @@ class Robot:
         joints = {"name": ["finger"], "position": [self.hand.gap_m / 2], "effort": [self.hand.force_n]}
         self.states.append(encode(JOINT_STATE, {"header": self.header(), **joints}))
         self.wrenches.append(self.wrench())
+        if behind and self.ticks - self.fault_tick < BEHIND:
+            return {}
         self.carried = {"/joint_states": self.states[0 if behind else -2 if again else -1]}
         if self.fault != "silent":
             self.carried["/wrench"] = self.wrenches[0 if behind else -1]
