@@ -273,10 +273,13 @@ FAR = "<body name='far' pos='0.5 0 0'><site name='far'/></body>"
     ("changed", "added", "widths"),
     [
         # Fingers that do not touch when they are closed, a geom with a margin, and a site of another gripper.
-        (
-            {"gap": '{ joint = "left", scale = -2.0, offset_m = 0.11 }'},
-            [('"0 0.045"', '"0 0.038"')] * 2,
-            (60, 40),
+        *(
+            (
+                {"gap": f'{{ joint = "left", scale = -2.0, offset_m = {0.09 + beyond_m} }}'},
+                [('"0 0.045"', '"0 0.038"')] * 2,
+                (40 + 1e3 * beyond_m, 40),
+            )
+            for beyond_m in (0.02, 0.012)
         ),
         ({}, [('condim="4"', 'condim="4" margin="0.008"')], (56, 40)),
         ({"gap": '{ sites = ["left_face", "far"] }'}, [("<worldbody>", f"<worldbody>{FAR}")], (500, 0)),

@@ -49,7 +49,7 @@ from graspsense_mujoco_gripper.camera import Camera, Window, free_camera, offscr
 from graspsense_mujoco_gripper.catalogue import catalogue
 from graspsense_mujoco_gripper.config import MujocoConfig
 from graspsense_mujoco_gripper.draft import Draft, drafted
-from graspsense_mujoco_gripper.drive import ActuatorDrive, Travel, instability
+from graspsense_mujoco_gripper.drive import OTHER_GAP, ActuatorDrive, Travel, instability
 from graspsense_mujoco_gripper.gripper_file import GripperFile, read_gripper
 from graspsense_mujoco_gripper.measurement import (
     ForceGauge,
@@ -397,7 +397,8 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         """Raise DeviceLost where the gap is not the width of what the fingers press on."""
         self._is_gap_checked = True
         held_m = self._forces.held_m() if isinstance(self._forces, ForceGauge) else nan
-        if abs(self._gap_m - held_m) > OTHER_WIDTH * self._travel.open_m:
+        share = OTHER_GAP if self._gripper.gap.joint else OTHER_WIDTH
+        if abs(self._gap_m - held_m) > share * self._travel.open_m:
             raise DeviceLost(
                 f"the gap is {self._gap_m * 1e3:.3g} mm, and the fingers press on what is {held_m * 1e3:.3g} mm wide, "
                 f"{self.config.object} or each other. Look at gap in gripper.file (scale, offset_m, sites, geoms or "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Set
 from math import hypot, inf, nan
-from typing import Any
+from typing import Any, Final
 
 import mujoco
 import numpy as np
@@ -91,7 +91,6 @@ class ForceGauge:
         cutoffs = [float(model.sensor_cutoff[number]) for number in numbers]
         self.most_n = min((cutoff for cutoff in cutoffs if cutoff > 0.0), default=inf)
         """From this force on, a sensor of the model shows no larger one."""
-        self._factors: dict[tuple[int, int], tuple[float, float]] = {}
         self._wrench = np.zeros(6)
         self._force = plain(self._wrench)
 
@@ -128,13 +127,10 @@ class ForceGauge:
 
     def _contacts(self) -> Iterator[tuple[int, float, float]]:
         """Yield the number of each contact of a finger, and its force on the left and on the right one."""
-        model, data, factors, roles, force = self._model, self._data, self._factors, self._roles, self._force
+        model, data, roles, force = self._model, self._data, self._roles, self._force
         contacts, rows = data.contact, None
-        for k, pair in enumerate(contacts.geom.tolist()):
-            key = tuple(pair)
-            signs = factors.get(key)
-            if signs is None:
-                signs = factors[key] = signs_of(roles[key[0]], roles[key[1]])
+        for k, (first, second) in enumerate(contacts.geom.tolist()):
+            signs = SIGNS[roles[first]][roles[second]]
             if signs == NOTHING:
                 continue
             if rows is None:
@@ -187,19 +183,20 @@ class ForceGauge:
         return total.tolist()  # type: ignore[no-any-return]
 
 
-def signs_of(role: int, other_role: int) -> tuple[float, float]:
-    """Return the sign of the force of a contact on the left and on the right finger; 0: none.
-
-    `role` and `other_role` are the roles of its geoms. The first row of the frame of a contact is the normal, from the
-    first geom to the second; the force acts on the second.
-    """
-
+def _signs(role: int, other_role: int) -> tuple[float, float]:
     def acting(finger: int) -> float:
         if other_role & finger and role & (ALL - finger):
             return 1.0
         return -1.0 if role & finger and other_role & (ALL - finger) else 0.0
 
     return -acting(LEFT), acting(RIGHT)
+
+
+SIGNS: Final = [[_signs(role, other) for other in range(ALL + 1)] for role in range(ALL + 1)]
+"""By the roles of the geoms of a contact: the sign of its force on the left and on the right finger; 0: none.
+
+The first row of the frame of a contact is the normal, from the first geom to the second; the force acts on the second.
+"""
 
 
 class SpringCells:
