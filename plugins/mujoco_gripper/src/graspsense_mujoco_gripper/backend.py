@@ -400,9 +400,8 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         share = OTHER_GAP if self._gripper.gap.joint else OTHER_WIDTH
         if abs(self._gap_m - held_m) > share * self._travel.open_m:
             raise DeviceLost(
-                f"the gap is {self._gap_m * 1e3:.3g} mm, and the fingers press on what is {held_m * 1e3:.3g} mm wide, "
-                f"{self.config.object} or each other. Look at gap in gripper.file (scale, offset_m, sites, geoms or "
-                "points), and at margins of geoms in the model"
+                f"the gap is {self._gap_m * 1e3:.3g} mm where the fingers press on what is {held_m * 1e3:.3g} mm wide "
+                "(0: on each other). Look at gap in gripper.file, and at margins of geoms in the model"
             )
 
     def _break_shell(self, data: mujoco.MjData) -> None:

@@ -113,17 +113,13 @@ class ForceGauge:
 
     def forces_n(self) -> tuple[float, float]:
         """Return the force on the left and on the right finger along the closing direction."""
-        left, right = self._sums() if self._by_contacts and self._data.ncon else (0.0, 0.0)
+        left = right = 0.0
+        if self._by_contacts and self._data.ncon:
+            for _, on_left, on_right in self._contacts():
+                left += on_left
+                right += on_right
         by_left, by_right = self._sensors
         return left if by_left is None else by_left(), right if by_right is None else by_right()
-
-    def _sums(self) -> tuple[float, float]:
-        """Return the sums of the forces at the contacts of each finger."""
-        left = right = 0.0
-        for _, on_left, on_right in self._contacts():
-            left += on_left
-            right += on_right
-        return left, right
 
     def _contacts(self) -> Iterator[tuple[int, float, float]]:
         """Yield the number of each contact of a finger, and its force on the left and on the right one."""
@@ -144,16 +140,13 @@ class ForceGauge:
 
         NaN where one of them presses on nothing. With a margin, a thing is pressed before it is reached.
         """
-        contact = self._data.contact
-        on_left, on_right, places_m = np.zeros(0), np.zeros(0), np.zeros(0)
-        pressed = list(self._contacts())
-        if pressed:
-            numbers, on_left, on_right = (np.array(column) for column in zip(*pressed, strict=True))
-            apart_m = np.maximum(contact.dist[numbers], 0.0)
-            places_m = contact.pos[numbers] @ self._axis - apart_m / 2.0 * np.sign(on_right - on_left)
-        if not (on_left.sum() > 0.0 and on_right.sum() > 0.0):
-            return nan
-        return float(np.average(places_m, weights=on_right) - np.average(places_m, weights=on_left))
+        contact, axis, moments = self._data.contact, self._axis, np.zeros((2, 2))
+        for k, on_left, on_right in self._contacts():
+            towards = 1.0 if on_left > on_right else -1.0
+            place_m = contact.pos[k] @ axis + towards * max(contact.dist[k], 0.0) / 2.0
+            moments += np.outer((on_left, on_right), (1.0, place_m))
+        (left_n, left_nm), (right_n, right_nm) = moments
+        return float(right_nm / right_n - left_nm / left_n) if left_n > 0.0 and right_n > 0.0 else nan
 
     def squeeze_n(self) -> float:
         """Return the force that squeezes a thing along the closing direction, by whatever parts of the gripper move."""
@@ -175,24 +168,19 @@ class ForceGauge:
 
     def _along_axis(self, frames: Floats) -> list[float]:
         """Return the component along the closing direction of each row of the frames of the contacts."""
-        axis, rows = self._axis, frames.reshape(-1, 3)
-        total = rows[:, 0] * axis[0]
-        for j in (1, 2):
-            if axis[j] != 0.0:
-                total = total + rows[:, j] * axis[j]
-        return total.tolist()  # type: ignore[no-any-return]
+        return (frames.reshape(-1, 3) @ self._axis).tolist()  # type: ignore[no-any-return]
 
 
-def _signs(role: int, other_role: int) -> tuple[float, float]:
-    def acting(finger: int) -> float:
-        if other_role & finger and role & (ALL - finger):
-            return 1.0
-        return -1.0 if role & finger and other_role & (ALL - finger) else 0.0
-
-    return -acting(LEFT), acting(RIGHT)
+def _acting(finger: int, role: int, other_role: int) -> float:
+    if other_role & finger and role & (ALL - finger):
+        return 1.0
+    return -1.0 if role & finger and other_role & (ALL - finger) else 0.0
 
 
-SIGNS: Final = [[_signs(role, other) for other in range(ALL + 1)] for role in range(ALL + 1)]
+SIGNS: Final = [
+    [(-_acting(LEFT, role, other), _acting(RIGHT, role, other)) for other in range(ALL + 1)]
+    for role in range(ALL + 1)
+]
 """By the roles of the geoms of a contact: the sign of its force on the left and on the right finger; 0: none.
 
 The first row of the frame of a contact is the normal, from the first geom to the second; the force acts on the second.
