@@ -84,13 +84,14 @@ def test_a_delay_is_used_only_if_the_terms_that_are_chosen_with_it_show_it(
     monkeypatch, found_s, shown, used_s
 ):
     choice = SimpleNamespace(fitted=None)
-    monkeypatch.setattr(run, "_timed", lambda *given: Timed(WHOLE, choice, [], given[3]))
+    monkeypatch.setattr(run, "_timed", lambda *given: Timed(WHOLE, choice, [given[3]]))
     monkeypatch.setattr(run, "lag_of", lambda choice: found_s)
     monkeypatch.setattr(run, "delay_of", lambda fitted, _, lag_s: delay_of(lag_s, shown(lag_s), 0.00151))
 
     used, told = run._with_delay(SimConfig(), None, [], [], None)
     assert told.used_s == pytest.approx(used_s, abs=1e-9)
-    assert used.lag_s == told.used_s
+    # The choice is that which was made with the lag that is told.
+    assert used.notes == [told.used_s]
 
 
 @pytest.mark.slow

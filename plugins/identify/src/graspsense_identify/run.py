@@ -70,7 +70,7 @@ def identify(
     progress("computing intervals", 0, 1)
     chosen, shares = used.choice, used.shares
     fitted = chosen.fitted
-    lag_error_s = math.hypot(PATH_ERROR_S if used.lag_s else 0.0, delay.error_s)
+    lag_error_s = math.hypot(PATH_ERROR_S if delay.used_s != delay.settings_s else 0.0, delay.error_s)
     parts = parts_of(fitted, has_lag=lag_error_s > 0.0)
     intervals = uncertainty(fitted, parts, shares.error / math.sqrt(len(fitted.squeezes)), lag_error_s)
     fracture = fracture_of(fitted, shares.scatter)
@@ -102,7 +102,6 @@ class Timed(NamedTuple):
     shares: Shares
     choice: Choice
     notes: list[str]
-    lag_s: float
 
 
 def _with_delay(
@@ -152,7 +151,7 @@ def _timed(
         )
         explained = explained_falls(choice.fitted)
         if not explained:
-            return Timed(shares, choice, notes, lag_s)
+            return Timed(shares, choice, notes)
         whole |= explained
 
 

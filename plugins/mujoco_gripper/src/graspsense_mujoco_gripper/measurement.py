@@ -124,13 +124,11 @@ class ForceGauge:
     def _contacts(self) -> Iterator[tuple[int, float, float]]:
         """Yield the number of each contact of a finger, and its force on the left and on the right one."""
         model, data, roles, force = self._model, self._data, self._roles, self._force
-        contacts, rows = data.contact, None
-        for k, (first, second) in enumerate(contacts.geom.tolist()):
+        rows = self._along_axis(data.contact.frame)
+        for k, (first, second) in enumerate(data.contact.geom.tolist()):
             signs = SIGNS[roles[first]][roles[second]]
             if signs == NOTHING:
                 continue
-            if rows is None:
-                rows = self._along_axis(contacts.frame)
             mujoco.mj_contactForce(model, data, k, self._wrench)
             along = rows[3 * k] * force[0] + rows[3 * k + 1] * force[1] + rows[3 * k + 2] * force[2]
             yield k, signs[0] * along, signs[1] * along

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import suppress
 from math import inf, isfinite, nan
 from types import MappingProxyType
@@ -238,15 +238,13 @@ class Ros2Backend(SensorBackend[Ros2Config]):
     def _subscribed(self, topic: str, until: float) -> NewestMessage:
         """Subscribe to a topic with the type that it is published with. Raises NoDevice."""
         assert self._node is not None
-        types: Sequence[str] = ()
-        while not types:
-            types = self._node.types_of(topic)
-            if not types and self.clock.monotonic() > until:
+        while not (types := self._node.types_of(topic)):
+            if self.clock.monotonic() > until:
                 raise NoDevice(
                     f"nobody publishes {topic} within {self.config.open_timeout_s:g} s. Look at ROS_DOMAIN_ID, at the "
                     "router (ros2 run rmw_zenoh_cpp rmw_zenohd), and at the names in the settings of the gripper"
                 )
-            self.clock.sleep(0.0 if types else LOOK_AGAIN_S)
+            self.clock.sleep(LOOK_AGAIN_S)
         if len(types) > 1 or not is_known(types[0]):
             raise NoDevice(
                 f"{topic} has the type {', '.join(types)}: it has to be one, of the common interfaces of ROS, such as "
