@@ -113,10 +113,10 @@ class InStep:
                 self._changed.notify_all()
 
         def answered(action, target):
-            before = action.goals, action.failures
+            counts = action.goals, action.failures
             want(action, target)
             with self._changed:
-                while (action.goals, action.failures) == before:
+                while (action.goals, action.failures) == counts:
                     self._changed.wait(0.001)
 
         setattr(Ros2Backend, "clock", self)

@@ -125,8 +125,8 @@ class ForceGauge:
         """Yield the number of each contact of a finger, and its force on the left and on the right one."""
         model, data, roles, force = self._model, self._data, self._roles, self._force
         rows = self._along_axis(data.contact.frame)
-        for k, (first, second) in enumerate(data.contact.geom.tolist()):
-            signs = SIGNS[roles[first]][roles[second]]
+        for k, pair in enumerate(data.contact.geom.tolist()):
+            signs = SIGNS[roles[pair[0]]][roles[pair[1]]]
             if signs == NOTHING:
                 continue
             mujoco.mj_contactForce(model, data, k, self._wrench)
