@@ -132,11 +132,11 @@ def test_the_gap_may_come_from_a_joint_or_from_geoms(grasped, tmp_path):
     assert by_joint == pytest.approx(by_geoms, abs=2e-4)
 
 
-def touching(folder, *, cutoff="", sites=("left_zone", "right_zone")):
-    """Return the gripper file with a touch sensor at each of these sites."""
+def touching(folder, *, kind="touch", cutoff="", sites=("left_zone", "right_zone")):
+    """Return the gripper file with a sensor of this kind at each of these sites."""
     zone = '<site name="{}_zone" type="box" size="0.006 0.012 0.012"/>'
     sensors = "".join(
-        f'<touch name="{name}" site="{site}" {cutoff}/>'
+        f'<{kind} name="{name}" site="{site}" {cutoff}/>'
         for name, site in zip(("lt", "rt"), sites, strict=True)
     )
     faces = {side: f'<site name="{side}_face" pos="0 0 0"/>' for side in ("left", "right")}
@@ -150,8 +150,9 @@ def touching(folder, *, cutoff="", sites=("left_zone", "right_zone")):
 
 
 @pytest.mark.slow
-def test_a_touch_sensor_measures_the_force_of_the_contacts(grasped, tmp_path):
-    file = touching(tmp_path)
+@pytest.mark.parametrize("kind", ["touch", "force"])
+def test_a_sensor_of_each_finger_measures_the_force_of_the_contacts(grasped, tmp_path, kind):
+    file = touching(tmp_path, kind=kind)
     assert grasped(f"gripper.file={file}", thing="can").features["f_steady"] == pytest.approx(20.0, abs=0.2)
 
 

@@ -109,7 +109,8 @@ class ForceGauge:
             )
         local = data.sensordata[address : address + 3]
         turn = data.site_xmat[int(model.sensor_objid[sensor])].reshape(3, 3)
-        return lambda: float(side * ((turn @ local) @ self._axis))
+        # It shows the force that the finger gets from what carries it, against that of the thing.
+        return lambda: float(-side * ((turn @ local) @ self._axis))
 
     def forces_n(self) -> tuple[float, float]:
         """Return the force on the left and on the right finger along the closing direction."""
