@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Set
-from math import hypot, inf, nan
+from math import copysign, hypot, inf, nan
 from typing import Any, Final
 
 import mujoco
@@ -141,8 +141,7 @@ class ForceGauge:
         """
         contact, axis, moments = self._data.contact, self._axis, np.zeros((2, 2))
         for k, on_left, on_right in self._contacts():
-            towards = 1.0 if on_left > on_right else -1.0
-            place_m = contact.pos[k] @ axis + towards * max(contact.dist[k], 0.0) / 2.0
+            place_m = contact.pos[k] @ axis + copysign(max(contact.dist[k], 0.0) / 2.0, on_left - on_right)
             moments += np.outer((on_left, on_right), (1.0, place_m))
         (left_n, left_nm), (right_n, right_nm) = moments
         return float(right_nm / right_n - left_nm / left_n) if left_n > 0.0 and right_n > 0.0 else nan
