@@ -30,6 +30,7 @@ from graspsense.core.drivers.emulated_body import finger_target as finger_target
 from graspsense.core.components.entries import EmulatorEntry as EmulatorEntry
 
 # Polling, reading threads and clocks of devices
+from graspsense.core.drivers.polling import Clock as Clock
 from graspsense.core.drivers.polling import Polling as Polling
 from graspsense.core.drivers.reading_thread import ReadingThread as ReadingThread
 from graspsense.core.drivers.device_clock import DeviceClock as DeviceClock

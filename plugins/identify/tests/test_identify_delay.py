@@ -1,6 +1,7 @@
 """The delay of the sensor: a lag of the force comes back, and does not bias what relaxes."""
 
 import tomllib
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,9 +9,10 @@ from attrs import evolve
 from cases import every_case
 from squeezes import delayed, grasped, recorded
 
-from graspsense_identify.delay import Delay, Timed, with_delay
+from graspsense_identify import run
+from graspsense_identify.delay import Delay
 from graspsense_identify.prepare import prepared
-from graspsense_identify.run import identify
+from graspsense_identify.run import Timed, identify
 from graspsense_identify.share import WHOLE
 from graspsense_sim_gripper.config import SimConfig
 
@@ -78,16 +80,18 @@ def test_the_delay_that_is_reported_is_the_one_that_is_used(shown_s):
         (0.0100, lambda used_s: used_s + 0.004, 0.0),  # they always show more
     ],
 )
-def test_a_delay_is_used_only_if_the_terms_that_are_chosen_with_it_show_it(found_s, shown, used_s):
-    def timed(lag_s):
-        return Timed(WHOLE, None, lag_s)
+def test_a_delay_is_used_only_if_the_terms_that_are_chosen_with_it_show_it(
+    monkeypatch, found_s, shown, used_s
+):
+    choice = SimpleNamespace(fitted=None)
+    monkeypatch.setattr(run, "_timed", lambda *given: Timed(WHOLE, choice, [given[3]]))
+    monkeypatch.setattr(run, "lag_of", lambda choice: found_s)
+    monkeypatch.setattr(run, "delay_of", lambda fitted, _, lag_s: delay_of(lag_s, shown(lag_s), 0.00151))
 
-    def delay(used):
-        return delay_of(used.lag_s, shown(used.lag_s), 0.00151)
-
-    used, told = with_delay(timed, lambda choice: found_s, delay)
+    used, told = run._with_delay(SimConfig(), None, [], [], None)
     assert told.used_s == pytest.approx(used_s, abs=1e-9)
-    assert used.lag_s == told.used_s
+    # The choice is that which was made with the lag that is told.
+    assert used.notes == [told.used_s]
 
 
 @pytest.mark.slow

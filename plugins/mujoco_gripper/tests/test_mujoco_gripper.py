@@ -1,6 +1,7 @@
 """Grasps with grippers that MuJoCo models describe, checked against what the mechanics give by hand. Simulated."""
 
 import os
+import re
 import tomllib
 
 import pytest
@@ -131,11 +132,11 @@ def test_the_gap_may_come_from_a_joint_or_from_geoms(grasped, tmp_path):
     assert by_joint == pytest.approx(by_geoms, abs=2e-4)
 
 
-def touching(folder, *, cutoff="", sites=("left_zone", "right_zone")):
-    """Return the gripper file with a touch sensor at each of these sites."""
+def touching(folder, *, kind="touch", cutoff="", sites=("left_zone", "right_zone")):
+    """Return the gripper file with a sensor of this kind at each of these sites."""
     zone = '<site name="{}_zone" type="box" size="0.006 0.012 0.012"/>'
     sensors = "".join(
-        f'<touch name="{name}" site="{site}" {cutoff}/>'
+        f'<{kind} name="{name}" site="{site}" {cutoff}/>'
         for name, site in zip(("lt", "rt"), sites, strict=True)
     )
     faces = {side: f'<site name="{side}_face" pos="0 0 0"/>' for side in ("left", "right")}
@@ -149,8 +150,9 @@ def touching(folder, *, cutoff="", sites=("left_zone", "right_zone")):
 
 
 @pytest.mark.slow
-def test_a_touch_sensor_measures_the_force_of_the_contacts(grasped, tmp_path):
-    file = touching(tmp_path)
+@pytest.mark.parametrize("kind", ["touch", "force"])
+def test_a_sensor_of_each_finger_measures_the_force_of_the_contacts(grasped, tmp_path, kind):
+    file = touching(tmp_path, kind=kind)
     assert grasped(f"gripper.file={file}", thing="can").features["f_steady"] == pytest.approx(20.0, abs=0.2)
 
 
@@ -263,6 +265,34 @@ def test_a_thing_that_is_squeezed_beside_what_measures_ends_the_grasp(grasped, t
     fingers = {"left": f'{{ geoms = ["{left}"] }}', "right": f'{{ geoms = ["{right}"] }}'}
     trial = grasped(f"gripper.file={gripper_file(tmp_path, **fingers)}")
     assert "no finger feels" in trial.reason
+
+
+FAR = "<body name='far' pos='0.5 0 0'><site name='far'/></body>"
+
+
+@every_case(
+    ("changed", "added", "widths"),
+    [
+        # Fingers that do not touch when they are closed, a geom with a margin, and a site of another gripper.
+        *(
+            (
+                {"gap": f'{{ joint = "left", scale = -2.0, offset_m = {0.09 + beyond_m} }}'},
+                [('"0 0.045"', '"0 0.038"')] * 2,
+                (40 + 1e3 * beyond_m, 40),
+            )
+            for beyond_m in (0.02, 0.012)
+        ),
+        ({}, [('condim="4"', 'condim="4" margin="0.008"')], (56, 40)),
+        ({"gap": '{ sites = ["left_face", "far"] }'}, [("<worldbody>", f"<worldbody>{FAR}")], (500, 0)),
+    ],
+)
+def test_a_gap_that_is_not_the_width_of_what_is_held_ends_the_grasp(
+    grasped, tmp_path, changed, added, widths
+):
+    trial = grasped(f"gripper.file={gripper_with(tmp_path, replaced(*added), **changed)}")
+    assert trial.outcome.words == "device lost"
+    gap_mm, held_mm = map(float, re.findall(r"([\d.]+) mm", trial.reason)[:2])
+    assert (gap_mm, held_mm) == (pytest.approx(widths[0], abs=2.0), pytest.approx(widths[1], abs=2.0))
 
 
 @pytest.mark.parametrize("part", ["contact", "equality", "actuation"])

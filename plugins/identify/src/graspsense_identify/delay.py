@@ -12,8 +12,8 @@ chosen anew with it, and it is used in place of that of the settings only if the
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from typing import Final, NamedTuple
+from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
 from attrs import frozen
@@ -25,7 +25,6 @@ from graspsense_identify.interval import identified, normal
 from graspsense_identify.parts import has_objects, parts_of
 from graspsense_identify.prepare import MAX_LAG_S
 from graspsense_identify.refuse import shows_memory
-from graspsense_identify.share import Shares
 
 EVIDENCE: Final = 5.0
 """The logarithm of the Bayes factor (Schwarz's approximation) from which on a lag is taken for real."""
@@ -150,39 +149,3 @@ def delay_of(fitted: Fitted, settings_s: float, lag_s: float) -> Delay:
         high_s=shown + half,
         basis=again.basis,
     )
-
-
-MAX_ROUNDS: Final = 3
-"""How often the lag is corrected by that which the terms chosen with it show."""
-
-
-class Timed(NamedTuple):
-    """The shares of the cells, and the choice, for the squeezes at the times that a lag of the force gives them."""
-
-    shares: Shares
-    choice: Choice
-    lag_s: float
-
-
-def with_delay(
-    timed: Callable[[float], Timed], lag_of: Callable[[Choice], float], delay: Callable[[Timed], Delay]
-) -> tuple[Timed, Delay]:
-    """Return the choice with the delay that is used.
-
-    `timed` makes the choice with a lag, `lag_of` returns that which all candidates show, and `delay` what the chosen
-    terms show. That of the settings is used where the interval of the chosen terms holds it, and where the lag does
-    not settle.
-    """
-    recorded = timed(0.0)
-    lag_s = lag_of(recorded.choice)
-    for _ in range(MAX_ROUNDS):
-        if lag_s == 0.0:
-            break
-        corrected = timed(lag_s)
-        shown = delay(corrected)
-        if shown.low_s <= shown.settings_s <= shown.high_s:
-            break
-        if abs(shown.shown_s - shown.used_s) <= PATH_ERROR_S:
-            return corrected, shown
-        lag_s = shown.shown_s - shown.settings_s
-    return recorded, delay(recorded)

@@ -7,7 +7,7 @@ import time
 from collections import Counter, defaultdict
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from attrs import evolve, fields_dict
@@ -16,8 +16,8 @@ from graspsense.plugin_api import ConfigError
 from graspsense.simulator_api import Identification, IdentifiedParameter, RecordedSqueeze, SqueezeFit
 from graspsense_identify.block import lag_of_block, with_fingertips_of_block
 from graspsense_identify.checks import predictive_checks
-from graspsense_identify.choose import choose
-from graspsense_identify.delay import PATH_ERROR_S, Delay, Timed, delay_of, lag_of, with_delay
+from graspsense_identify.choose import Choice, choose
+from graspsense_identify.delay import PATH_ERROR_S, Delay, delay_of, lag_of
 from graspsense_identify.fit import Fitted
 from graspsense_identify.forward import ForwardModel, path_forces
 from graspsense_identify.fracture import explained_falls, fracture_of, not_broken, of_whole_objects
@@ -37,6 +37,8 @@ WEAK_N: Final = 0.1
 """A largest force below this one is more likely in another unit than that of so weak a squeeze."""
 MAX_SQUEEZES: Final = 30
 """More recordings hardly narrow the intervals, and a fit of all takes minutes."""
+MAX_ROUNDS: Final = 3
+"""How often the lag is corrected by that which the terms chosen with it show."""
 OF_FINGERTIPS: Final = (
     *("pad_stiffness_n_m", "pad_damping_n_s_m", "pad_creep_n_m", "pad_creep_s"),
     *("pad_hardening_m", "pad_exponent"),
@@ -64,19 +66,11 @@ def identify(
     recorded = _used(_distinct(squeezes, notes), notes)
     notes += _looks_wrong(recorded)
 
-    def timed(lag_s: float) -> Timed:
-        used, said = _timed(config, model, recorded, lag_s, progress)
-        notes.extend(() if lag_s else said)
-        return used
-
-    def shown(used: Timed) -> Delay:
-        return delay_of(used.choice.fitted, config.force_delay_s, used.lag_s)
-
-    used, delay = with_delay(timed, lag_of, shown)
+    used, delay = _with_delay(config, model, recorded, notes, progress)
     progress("computing intervals", 0, 1)
     chosen, shares = used.choice, used.shares
     fitted = chosen.fitted
-    lag_error_s = math.hypot(PATH_ERROR_S if used.lag_s else 0.0, delay.error_s)
+    lag_error_s = math.hypot(PATH_ERROR_S if delay.used_s != delay.settings_s else 0.0, delay.error_s)
     parts = parts_of(fitted, has_lag=lag_error_s > 0.0)
     intervals = uncertainty(fitted, parts, shares.error / math.sqrt(len(fitted.squeezes)), lag_error_s)
     fracture = fracture_of(fitted, shares.scatter)
@@ -102,14 +96,48 @@ def identify(
     return evolve(result, scene=scene, seconds=time.monotonic() - begin)
 
 
+class Timed(NamedTuple):
+    """The shares of the cells, the choice, and notes, for squeezes at the times that a lag of the force gives them."""
+
+    shares: Shares
+    choice: Choice
+    notes: list[str]
+
+
+def _with_delay(
+    config: SimConfig,
+    model: ForwardModel,
+    recorded: Sequence[RecordedSqueeze],
+    notes: list[str],
+    progress: Progress,
+) -> tuple[Timed, Delay]:
+    """Return the choice with the delay that is used, and add notes on the squeezes.
+
+    That of the settings is used where the interval of the chosen terms holds it, and where the lag does not settle.
+    """
+    settings_s = config.force_delay_s
+    by_settings = _timed(config, model, recorded, 0.0, progress)
+    notes += by_settings.notes
+    lag_s = lag_of(by_settings.choice)
+    for _ in range(MAX_ROUNDS if lag_s else 0):
+        corrected = _timed(config, model, recorded, lag_s, progress)
+        shown = delay_of(corrected.choice.fitted, settings_s, lag_s)
+        if shown.low_s <= settings_s <= shown.high_s:
+            break
+        if abs(shown.shown_s - shown.used_s) <= PATH_ERROR_S:
+            return corrected, shown
+        lag_s = shown.shown_s - settings_s
+    return by_settings, delay_of(by_settings.choice.fitted, settings_s, 0.0)
+
+
 def _timed(
     config: SimConfig,
     model: ForwardModel,
     recorded: Sequence[RecordedSqueeze],
     lag_s: float,
     progress: Progress,
-) -> tuple[Timed, list[str]]:
-    """Return the choice for squeezes whose force lags like this, and notes on them.
+) -> Timed:
+    """Return the choice for squeezes whose force lags like this.
 
     It is made again with the whole squeezes where the chosen object explains a fall of the force that looked like a
     break.
@@ -123,7 +151,7 @@ def _timed(
         )
         explained = explained_falls(choice.fitted)
         if not explained:
-            return Timed(shares, choice, lag_s), notes
+            return Timed(shares, choice, notes)
         whole |= explained
 
 

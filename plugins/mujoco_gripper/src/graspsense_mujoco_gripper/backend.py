@@ -49,7 +49,7 @@ from graspsense_mujoco_gripper.camera import Camera, Window, free_camera, offscr
 from graspsense_mujoco_gripper.catalogue import catalogue
 from graspsense_mujoco_gripper.config import MujocoConfig
 from graspsense_mujoco_gripper.draft import Draft, drafted
-from graspsense_mujoco_gripper.drive import ActuatorDrive, Travel, instability
+from graspsense_mujoco_gripper.drive import OTHER_GAP, ActuatorDrive, Travel, instability
 from graspsense_mujoco_gripper.gripper_file import GripperFile, read_gripper
 from graspsense_mujoco_gripper.measurement import (
     ForceGauge,
@@ -77,7 +77,10 @@ DEEPEST_M: Final = 1e-3
 TOUCH_N: Final = 0.1
 """Force on both fingers from which on the motion of the scene begins: less may be the palm that swings."""
 UNFELT_N: Final = 1.0
-"""A thing that is squeezed by more, before a finger has felt `TOUCH_N`, is touched beside what measures."""
+"""A thing that is squeezed by more, before a finger has felt `TOUCH_N`, is touched beside what measures. When both
+fingers feel as much, the gap is compared with the width of the thing between them."""
+OTHER_WIDTH: Final = 0.15
+"""By more than this share of the opening, the gap is not where fingers hold a thing; of some that tilt by 0.12."""
 MANY: Final = 256
 """Errors of the forces that are drawn at once."""
 MOST_KNOWN: Final = 16
@@ -265,6 +268,7 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         self._drive.reset(self._gap_m)
         self._command = Command(EFFORT, 0.0, inf, inf)
         self._ticks, self._swings, self._broken, self._greatest_n = 0, 0, False, 0.0
+        self._is_gap_checked = isinstance(self._forces, SpringCells)
         self._measured_m = self._rounded(self._gap_m)
 
     def _check_start(self, data: mujoco.MjData) -> None:
@@ -343,6 +347,8 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         self._greatest_n = max(self._greatest_n, left, right)
         if data.ncon and not TOUCH_N <= self._greatest_n < self._most_n:
             self._check_felt()
+        if not self._is_gap_checked and min(left, right) > UNFELT_N:
+            self._check_gap()
         t_s = self._ticks * tick_s
         if self._motion.moves:
             self._motion.set(data, t_s, touched=min(left, right) > TOUCH_N)
@@ -385,6 +391,17 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
             raise DeviceLost(
                 f"the gripper squeezes {self.config.object} with {squeeze_n:.3g} N, and no finger feels it. Look at "
                 "the geoms, bodies and sensors of left and right in gripper.file: do they touch, and on which side?"
+            )
+
+    def _check_gap(self) -> None:
+        """Raise DeviceLost where the gap is not the width of what the fingers press on."""
+        self._is_gap_checked = True
+        held_m = self._forces.held_m() if isinstance(self._forces, ForceGauge) else nan
+        share = OTHER_GAP if self._gripper.gap.joint else OTHER_WIDTH
+        if abs(self._gap_m - held_m) > share * self._travel.open_m:
+            raise DeviceLost(
+                f"the gap is {self._gap_m * 1e3:.3g} mm where the fingers press on what is {held_m * 1e3:.3g} mm wide "
+                "(0: on each other). Look at gap in gripper.file, and at margins of geoms in the model"
             )
 
     def _break_shell(self, data: mujoco.MjData) -> None:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Set
-from math import hypot, inf
-from typing import Any
+from collections.abc import Callable, Iterator, Set
+from math import copysign, hypot, inf, nan
+from typing import Any, Final
 
 import mujoco
 import numpy as np
@@ -91,7 +91,6 @@ class ForceGauge:
         cutoffs = [float(model.sensor_cutoff[number]) for number in numbers]
         self.most_n = min((cutoff for cutoff in cutoffs if cutoff > 0.0), default=inf)
         """From this force on, a sensor of the model shows no larger one."""
-        self._factors: dict[tuple[int, int], tuple[float, float]] = {}
         self._wrench = np.zeros(6)
         self._force = plain(self._wrench)
 
@@ -110,33 +109,42 @@ class ForceGauge:
             )
         local = data.sensordata[address : address + 3]
         turn = data.site_xmat[int(model.sensor_objid[sensor])].reshape(3, 3)
-        return lambda: float(side * ((turn @ local) @ self._axis))
+        # It shows the force that the finger gets from what carries it, against that of the thing.
+        return lambda: float(-side * ((turn @ local) @ self._axis))
 
     def forces_n(self) -> tuple[float, float]:
         """Return the force on the left and on the right finger along the closing direction."""
-        left, right = self._sums() if self._by_contacts and self._data.ncon else (0.0, 0.0)
+        left = right = 0.0
+        if self._by_contacts and self._data.ncon:
+            for _, on_left, on_right in self._contacts():
+                left += on_left
+                right += on_right
         by_left, by_right = self._sensors
         return left if by_left is None else by_left(), right if by_right is None else by_right()
 
-    def _sums(self) -> tuple[float, float]:
-        """Return the sums of the forces at the contacts of each finger."""
-        model, data, factors, roles, force = self._model, self._data, self._factors, self._roles, self._force
-        contacts, rows = data.contact, None
-        left = right = 0.0
-        for k, pair in enumerate(contacts.geom.tolist()):
-            key = tuple(pair)
-            signs = factors.get(key)
-            if signs is None:
-                signs = factors[key] = signs_of(roles[key[0]], roles[key[1]])
+    def _contacts(self) -> Iterator[tuple[int, float, float]]:
+        """Yield the number of each contact of a finger, and its force on the left and on the right one."""
+        model, data, roles, force = self._model, self._data, self._roles, self._force
+        rows = self._along_axis(data.contact.frame)
+        for k, pair in enumerate(data.contact.geom.tolist()):
+            signs = SIGNS[roles[pair[0]]][roles[pair[1]]]
             if signs == NOTHING:
                 continue
-            if rows is None:
-                rows = self._along_axis(contacts.frame)
             mujoco.mj_contactForce(model, data, k, self._wrench)
             along = rows[3 * k] * force[0] + rows[3 * k + 1] * force[1] + rows[3 * k + 2] * force[2]
-            left += signs[0] * along
-            right += signs[1] * along
-        return left, right
+            yield k, signs[0] * along, signs[1] * along
+
+    def held_m(self) -> float:
+        """Return how wide the thing is where both fingers press on it, or 0 where they press on each other.
+
+        NaN where one of them presses on nothing. With a margin, a thing is pressed before it is reached.
+        """
+        contact, axis, moments = self._data.contact, self._axis, np.zeros((2, 2))
+        for k, on_left, on_right in self._contacts():
+            place_m = contact.pos[k] @ axis + copysign(max(contact.dist[k], 0.0) / 2.0, on_left - on_right)
+            moments += np.outer((on_left, on_right), (1.0, place_m))
+        (left_n, left_nm), (right_n, right_nm) = moments
+        return float(right_nm / right_n - left_nm / left_n) if left_n > 0.0 and right_n > 0.0 else nan
 
     def squeeze_n(self) -> float:
         """Return the force that squeezes a thing along the closing direction, by whatever parts of the gripper move."""
@@ -158,27 +166,23 @@ class ForceGauge:
 
     def _along_axis(self, frames: Floats) -> list[float]:
         """Return the component along the closing direction of each row of the frames of the contacts."""
-        axis, rows = self._axis, frames.reshape(-1, 3)
-        total = rows[:, 0] * axis[0]
-        for j in (1, 2):
-            if axis[j] != 0.0:
-                total = total + rows[:, j] * axis[j]
-        return total.tolist()  # type: ignore[no-any-return]
+        return (frames.reshape(-1, 3) @ self._axis).tolist()  # type: ignore[no-any-return]
 
 
-def signs_of(role: int, other_role: int) -> tuple[float, float]:
-    """Return the sign of the force of a contact on the left and on the right finger; 0: none.
+def _acting(finger: int, role: int, other_role: int) -> float:
+    if other_role & finger and role & (ALL - finger):
+        return 1.0
+    return -1.0 if role & finger and other_role & (ALL - finger) else 0.0
 
-    `role` and `other_role` are the roles of its geoms. The first row of the frame of a contact is the normal, from the
-    first geom to the second; the force acts on the second.
-    """
 
-    def acting(finger: int) -> float:
-        if other_role & finger and role & (ALL - finger):
-            return 1.0
-        return -1.0 if role & finger and other_role & (ALL - finger) else 0.0
+SIGNS: Final = [
+    [(-_acting(LEFT, role, other), _acting(RIGHT, role, other)) for other in range(ALL + 1)]
+    for role in range(ALL + 1)
+]
+"""By the roles of the geoms of a contact: the sign of its force on the left and on the right finger; 0: none.
 
-    return -acting(LEFT), acting(RIGHT)
+The first row of the frame of a contact is the normal, from the first geom to the second; the force acts on the second.
+"""
 
 
 class SpringCells:

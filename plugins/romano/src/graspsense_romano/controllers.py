@@ -139,6 +139,21 @@ class State(NamedTuple):
     conditions: TouchConditions
 
 
+def state_of(
+    progress: Progress, events: int, wanted_m: float, signals: Signals, now: TouchConditions
+) -> State:
+    """Return the state of a grasp that is so far."""
+    return State(
+        phase=progress.phase,
+        outcome=progress.outcome,
+        events=events,
+        progress=progress,
+        wanted_m=wanted_m,
+        signals=signals,
+        conditions=now,
+    )
+
+
 NOT_BEGUN: Final = -1
 
 
@@ -177,15 +192,7 @@ def step(params: Params, state: State, reading: Reading) -> tuple[Command, State
         if progress.outcome == STEADY and earlier.outcome == RUNNING:
             events |= PLACE_BIT
     command, wanted = commanded(params, progress, wanted, frame)
-    return command, State(
-        phase=progress.phase,
-        outcome=progress.outcome,
-        events=events,
-        progress=progress,
-        wanted_m=wanted,
-        signals=signals,
-        conditions=now,
-    )
+    return command, state_of(progress, events, wanted, signals, now)
 
 
 def detect(params: Params, state: State, reading: Reading) -> tuple[Command, State]:
@@ -208,15 +215,7 @@ def detect(params: Params, state: State, reading: Reading) -> tuple[Command, Sta
             events |= UNFELT_BIT
     outcome = NEVER_STEADY if t_s - since_s > params.plan.place_timeout_s else RUNNING
     progress = Progress(APPROACH, outcome, Stage(stage, since_s, since_s), HeldContact(0.0, 0.0, 0.0))
-    return Command(EFFORT, 0.0, inf, inf), State(
-        phase=APPROACH,
-        outcome=outcome,
-        events=events,
-        progress=progress,
-        wanted_m=0.0,
-        signals=signals,
-        conditions=now,
-    )
+    return Command(EFFORT, 0.0, inf, inf), state_of(progress, events, 0.0, signals, now)
 
 
 def ended(now: Progress, outcome: int) -> Progress:
@@ -377,15 +376,7 @@ class _Romano(Controller[ConfigT]):
     def init(self) -> State:
         """Return the state before the first tick."""
         progress = Progress(APPROACH, RUNNING, Stage(NOT_BEGUN, 0.0, 0.0), HeldContact(0.0, 0.0, 0.0))
-        return State(
-            phase=APPROACH,
-            outcome=RUNNING,
-            events=0,
-            progress=progress,
-            wanted_m=0.0,
-            signals=NO_SIGNALS,
-            conditions=NOTHING,
-        )
+        return state_of(progress, 0, 0.0, NO_SIGNALS, NOTHING)
 
     def reason(self, state: Any) -> str:
         """Return with which force a thing was lost, and whether the force limit cannot hold it."""

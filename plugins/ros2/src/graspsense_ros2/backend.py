@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import suppress
 from math import inf, isfinite, nan
 from types import MappingProxyType
-from typing import Final, final
+from typing import ClassVar, Final, final
 
-from graspsense.gripper_api import Polling, StatusBit, finger_target
+from graspsense.gripper_api import Clock, Polling, StatusBit, finger_target
 from graspsense.plugin_api import (
     FORCE,
     NO_PADS,
@@ -36,7 +36,7 @@ GOAL_PERIOD_S: Final = 0.05
 """Time between two goals while the target moves."""
 AHEAD_M: Final = 0.004
 """How far the target can be ahead of the fingers while they close."""
-LOOK_AGAIN_S: Final = 0.1
+LOOK_AGAIN_S: Final = 0.02
 LATE_S: Final = 0.1
 """By how much later than the quickest one a message may come without a fault."""
 REPEATED: Final = 3
@@ -64,6 +64,7 @@ class Ros2Backend(SensorBackend[Ros2Config]):
     """A gripper that is measured by topics and closes by itself to the goals of an action."""
 
     accepts = ("position", "force")
+    clock: ClassVar[Clock] = time
     closes_itself: Mapping[str, str] = MappingProxyType(
         {
             "position": "goals that approach the target at its speed, with its force as their effort",
@@ -79,7 +80,7 @@ class Ros2Backend(SensorBackend[Ros2Config]):
         self._node: Node | None = None
         self._action: GripperAction | None = None
         self._topics: dict[str, NewestMessage] = {}
-        self._polling = Polling(config.rate_hz)
+        self._polling = Polling(config.rate_hz, self.clock)
         self._report: dict[str, float | int | str | bool] = {}
 
     @property
@@ -92,16 +93,18 @@ class Ros2Backend(SensorBackend[Ros2Config]):
         """Subscribe to the topics and look for the action; no finger moves. Raises NoDevice."""
         self.close()
         self._report = {}
-        until = time.monotonic() + self.config.open_timeout_s
+        until = self.clock.monotonic() + self.config.open_timeout_s
         try:
             self._node = open_node(f"graspsense_gripper_{os.getpid()}", self.config.through)
             topics = sorted({topic for number in self._numbers.values() for topic in number.topics})
             self._topics = {topic: self._subscribed(topic, until) for topic in topics}
             for newest in self._topics.values():
-                if not newest.wait(max(0.0, until - time.monotonic())) and not newest.columns:
+                while not newest.came and self.clock.monotonic() < until:
+                    self.clock.sleep(LOOK_AGAIN_S)
+                if not newest.came and not newest.columns:
                     raise NoDevice(f"no message on {newest.topic}, although it is announced{_damage(newest)}")
             self._action = self._answering(until)
-            self._polling = Polling(self.config.rate_hz)
+            self._polling = Polling(self.config.rate_hz, self.clock)
             self._good = dict.fromkeys(self._numbers, (nan, self._polling.began_s))
             self._gap_m = self._measured()["gap"]
             self._repeated = sum(topic.repeated + topic.late for topic in self._topics.values())
@@ -153,7 +156,7 @@ class Ros2Backend(SensorBackend[Ros2Config]):
             effort=min(max(effort, config.least_effort_n), config.effort_limit_n),
             speed=speed,
         )
-        now_s = time.monotonic()
+        now_s = self.clock.monotonic()
         if target != self._sent and now_s - self._sent_s >= GOAL_PERIOD_S:
             self._sent, self._sent_s = target, now_s
             self._action.want(target)
@@ -205,7 +208,7 @@ class Ros2Backend(SensorBackend[Ros2Config]):
 
     def _measured(self) -> dict[str, float]:
         """Return the newest number of each channel. Raises DeviceLost where one is missing for too long."""
-        config, now_s = self.config, time.monotonic()
+        config, now_s = self.config, self.clock.monotonic()
         columns: dict[str, object] = {}
         for newest in self._topics.values():
             if newest.age_s() > config.silent_s and (newest.came or not newest.columns):
@@ -235,15 +238,13 @@ class Ros2Backend(SensorBackend[Ros2Config]):
     def _subscribed(self, topic: str, until: float) -> NewestMessage:
         """Subscribe to a topic with the type that it is published with. Raises NoDevice."""
         assert self._node is not None
-        types: Sequence[str] = ()
-        while not types:
-            types = self._node.types_of(topic)
-            if not types and time.monotonic() > until:
+        while not (types := self._node.types_of(topic)):
+            if self.clock.monotonic() > until:
                 raise NoDevice(
                     f"nobody publishes {topic} within {self.config.open_timeout_s:g} s. Look at ROS_DOMAIN_ID, at the "
                     "router (ros2 run rmw_zenoh_cpp rmw_zenohd), and at the names in the settings of the gripper"
                 )
-            time.sleep(0.0 if types else LOOK_AGAIN_S)
+            self.clock.sleep(LOOK_AGAIN_S)
         if len(types) > 1 or not is_known(types[0]):
             raise NoDevice(
                 f"{topic} has the type {', '.join(types)}: it has to be one, of the common interfaces of ROS, such as "
@@ -251,7 +252,7 @@ class Ros2Backend(SensorBackend[Ros2Config]):
             )
         names = frozenset[str]().union(*(number.names for number in self._numbers.values()))
         newest = NewestMessage(
-            topic, types[0], frozenset(name for name in names if name.startswith(f"{topic}."))
+            topic, types[0], frozenset(name for name in names if name.startswith(f"{topic}.")), self.clock
         )
         self._node.subscribe(topic, types[0], newest.take)
         return newest
@@ -267,10 +268,10 @@ class Ros2Backend(SensorBackend[Ros2Config]):
                 action.cancel()
                 return action
             except ServiceFailed as error:
-                if time.monotonic() > until:
+                if self.clock.monotonic() > until:
                     action.end()
                     raise NoDevice(f"the action {config.action} ({config.action_type}): {error}") from error
-                time.sleep(LOOK_AGAIN_S)
+                self.clock.sleep(LOOK_AGAIN_S)
 
     def _described(self) -> DeviceInfo:
         config = self.config

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 import time
 from collections.abc import Mapping
 from math import inf
@@ -12,7 +11,7 @@ import numpy as np
 from attrs import define, field
 from numpy.typing import NDArray
 
-from graspsense.gripper_api import message_columns
+from graspsense.gripper_api import Clock, message_columns
 from graspsense_ros2.message_types import BadMessage, decode
 
 
@@ -32,6 +31,7 @@ class NewestMessage:
     topic: str
     type_name: str
     wanted: frozenset[str] = frozenset()
+    clock: Clock = time
     damaged: int = 0
     ambiguous: int = 0
     late: int = 0
@@ -42,11 +42,10 @@ class NewestMessage:
     _stamp_s: float = -inf
     _quickest_s: float = inf
     lateness_s: float = 0.0
-    _came: threading.Event = field(factory=threading.Event)
 
     def take(self, data: bytes) -> None:
         """Receive a message. It is called in the thread of the network."""
-        now_s = time.monotonic()
+        now_s = self.clock.monotonic()
         try:
             message = decode(self.type_name, data)
         except BadMessage:
@@ -71,7 +70,6 @@ class NewestMessage:
             self.lateness_s = now_s - stamp_s - self._quickest_s
         self.columns = columns
         self._came_s = now_s
-        self._came.set()
 
     def _is_of_these_joints(self, joints: tuple[str, ...]) -> bool:
         if self._joints is None:
@@ -82,15 +80,11 @@ class NewestMessage:
     @property
     def came(self) -> bool:
         """Whether a message with the wanted fields has come."""
-        return self._came.is_set()
+        return self._came_s > -inf
 
     def age_s(self) -> float:
         """Return how old the newest message is; inf if none came."""
-        return time.monotonic() - self._came_s + self.lateness_s
-
-    def wait(self, timeout_s: float) -> bool:
-        """Wait for the first message, and return whether it came."""
-        return self._came.wait(timeout_s)
+        return self.clock.monotonic() - self._came_s + self.lateness_s
 
 
 def _stamp_of(message: Any) -> float | None:
