@@ -24,7 +24,7 @@ from graspsense.core.components.entries import ModelEntry
 from graspsense.core.components.registry import installed
 from graspsense.core.values.errors import ConfigError, listed
 from graspsense.core.values.features import UNKNOWN, FeatureTable, Prediction, assumed_units
-from graspsense.core.values.label_text import alike_words, spelled_alike
+from graspsense.core.values.label_text import alike_words, natural_order, spelled_alike
 from graspsense.evaluation.intervals import RecognitionRate, rate_of
 from graspsense.evaluation.json_codec import to_json
 
@@ -68,7 +68,8 @@ def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
     strange = set() if labelled is None else {*labelled.labels} - {*asked.classifier.classes()}
     if strange:
         alike = alike_words(spelled_alike([*strange, *asked.classifier.classes()]))
-        told = f"labels that the model does not know, so that no answer to them is right: {listed(sorted(strange))}"
+        names = listed(natural_order(strange))
+        told = f"labels that the model does not know, so that no answer to them is right: {names}"
         notes = (*notes, told + (f" (differing in spelling only: {alike})" if alike else ""))
     if len(table) > MOST_WITH_REASONS:
         notes = (*notes, f"more than {MOST_WITH_REASONS} trials: the predictions have no reasons")

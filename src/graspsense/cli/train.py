@@ -40,6 +40,7 @@ from graspsense.core.files.whole_file import write_whole
 from graspsense.core.learn.labelled import Labelled, class_of
 from graspsense.core.settings.selected import SelectedComponent
 from graspsense.core.values.errors import ConfigError, counted
+from graspsense.core.values.label_text import natural_order
 from graspsense.evaluation.gathered_warnings import gathered_warnings
 
 if TYPE_CHECKING:
@@ -239,7 +240,7 @@ def _say_trained(out: str, model: Model) -> None:
     from graspsense.core.learn.conformal import units_needed
 
     echo(f"{out}: {model.in_a_line}", indent=2)
-    echo_entry("labels", ", ".join(model.classifier.classes()))
+    echo_entry("labels", ", ".join(natural_order(model.classifier.classes())))
     if model.sets is not None:
         echo_entry("sets", model.sets.in_words)
         if model.sets.trials:
@@ -276,7 +277,7 @@ def _refuse_single_scene(source: str) -> None:
 
 def _with_target(labelled: Labelled, target: str) -> Labelled:
     """Return the trials with the labels that the target asks for. Raises ConfigError if a model cannot learn them."""
-    classes = sorted({class_of(label) for label in labelled.labels})
+    classes = natural_order(map(class_of, labelled.labels))
     if target == "state" and len(classes) > 1:
         raise ConfigError(
             "a model of states is for a single class; select it with --only: " + ", ".join(classes)

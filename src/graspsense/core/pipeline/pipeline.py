@@ -112,7 +112,10 @@ def _how_to_train(settings: Settings, out: str) -> str:
         table = part.component.table
         for key, value in settings.values[table].items():
             name = f"{table}.{key}"
-            if settings.origins.get(name, "").startswith("-o") and name not in ("gripper.type", "gripper.object"):
+            if settings.origins.get(name, "").startswith("-o") and name not in (
+                "gripper.type",
+                "gripper.object",
+            ):
                 text = part.component.name if key == "type" else toml_value(value)
                 selected.append(f"-o {shlex.quote(f'{name}={text}')}")
     selection = " ".join(selected)

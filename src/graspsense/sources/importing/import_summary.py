@@ -11,6 +11,7 @@ from attrs import frozen
 
 from graspsense.core.components.channels import dtype_of, further
 from graspsense.core.values.channel import FLOATS
+from graspsense.core.values.label_text import natural_order
 from graspsense.core.values.signals import CHANNEL_OF_FIELD, Image, Samples
 from graspsense.core.values.trace import SI_UNITS
 from graspsense.recording.labelled_recording import LabelledRecording
@@ -70,7 +71,7 @@ def summary_of(recordings: Sequence[LabelledRecording]) -> ImportSummary:
     times = sorted(recording.recorded_at for recording in recordings)
     return ImportSummary(
         grasps=len(recordings),
-        labels=tuple(_label(label, some) for label, some in sorted(by_label.items())),
+        labels=tuple(_label(label, by_label[label]) for label in natural_order(by_label)),
         units=dict(earliest.units),
         channels=tuple(f"{channel.name} [{channel.unit}]" for channel in further(earliest.channels)),
         values=tuple(dict.fromkeys(name for recording in recordings for name in recording.values)),
