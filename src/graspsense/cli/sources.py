@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -259,7 +259,7 @@ def detector_of(source: str, given: Mapping[str, Any]) -> SelectedComponent:
     return _alone("controller", "event-detector", given, source)
 
 
-def command_line(without: Sequence[str], command: str = "") -> str:
+def command_line(without: Collection[str], command: str = "") -> str:
     """Return the command that is running, or another one with its arguments, without some options, as printable."""
     context = click.get_current_context()
     words = ["graspsense", command or str(context.info_name)]

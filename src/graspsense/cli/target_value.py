@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -105,6 +106,7 @@ def train_value(
     )
     # In one line, so that it can be copied.
     echo_as_it_is(f"how good    {command_line(('out', 'keep', 'overwrite', 'as_json'), 'evaluate')}")
+    echo_as_it_is(f"use it      graspsense predict {shlex.quote(out)} OTHER")
 
 
 def predict_value(model_name: str, source: str, as_json: bool, given: Mapping[str, Any]) -> None:

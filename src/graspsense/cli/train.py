@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -18,10 +19,11 @@ from graspsense.cli.choosing import (
     refuse_with_choice,
     say_chosen,
 )
-from graspsense.cli.options import target_option
+from graspsense.cli.options import target_option, typed
 from graspsense.cli.output import check_outputs, echo_json, file_to_write_as
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import (
+    SIMULATED,
     SOURCES,
     checkpoints_option,
     classifier_option,
@@ -50,6 +52,8 @@ if TYPE_CHECKING:
 
 _NOT_EVALUATED: Final = ("out", "keep", "overwrite", "as_json", "calibration_instances", "choose")
 """Options of `train` that `evaluate` does not have."""
+_OF_PIPELINE: Final = ("pipeline", "gripper", "options", "force")
+"""Options of `train` that `run` has too."""
 
 
 @click.command(
@@ -138,7 +142,7 @@ def train(
     if trained is not None:
         say_chosen(trained, pipeline)
     else:
-        _say_how_good(default=classifier is None and not given["options"])
+        _say_what_next(source, out, model, default=classifier is None and not given["options"])
 
 
 def _maker(learner: SelectedComponent, name: str, target: str, seed: int) -> Callable[[Labelled], Model]:
@@ -156,10 +160,18 @@ def _maker(learner: SelectedComponent, name: str, target: str, seed: int) -> Cal
     )
 
 
-def _say_how_good(*, default: bool) -> None:
-    """Print the command that tells how good the model is, and what to do where nobody chose its features."""
-    # In one line, so that it can be copied.
+def _say_what_next(source: str, out: str, model: Model, *, default: bool) -> None:
+    """Print the commands that tell how good the model is and use it, and what to do where nobody chose its features."""
+    from graspsense.sources.trial_source import kind_of
+
+    use = f"graspsense predict {shlex.quote(out)} OTHER.csv"
+    if not is_csv(source):
+        use = command_line({*typed()}.difference(_OF_PIPELINE), "run")
+        use += f" -o classifier.type={model.component} -o classifier.model={shlex.quote(out)}"
+        use += "" if kind_of(source) == SIMULATED else "   (and the pipeline of these trials)"
+    # In one line each, so that they can be copied.
     echo_as_it_is(f"how good    {command_line(_NOT_EVALUATED, 'evaluate')}")
+    echo_as_it_is(f"use it      {use}")
     if default:
         echo_entry(
             "choice", "classifier and features are the defaults; --choose finds those that suit the trials"
