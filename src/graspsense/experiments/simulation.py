@@ -13,9 +13,11 @@ import numpy as np
 from attrs import asdict, evolve, field, frozen
 
 from graspsense.core.components.roles import BatchBackend, Grasped, SimulationVariant
-from graspsense.core.values.errors import ConfigError, named
+from graspsense.core.values.errors import ConfigError, counted, named
 from graspsense.evaluation.intervals import Difference, RecognitionRate, percent
 from graspsense.experiments.versions import measured_on
+from graspsense.report.found_table import FoundTable
+from graspsense.report.html import Page, Section, facts
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -24,8 +26,6 @@ if TYPE_CHECKING:
     from graspsense.core.values.features import Features
     from graspsense.core.values.trace import Trace
 
-HEADER: Final = ("METHOD", "FIDELITY", "STEP OR ACCURACY", "MS A GRASP", "SET-UP, S")
-RECOGNITION: Final = ("RECOGNISED", "REFERENCE LESS THIS")
 PEAK: Final = "peak force"
 TRACE: Final = "force trace, rms"
 SCENES: Final = (
@@ -84,26 +84,61 @@ class SimulationTrade:
         return asdict(self)
 
 
-def simulation_rows(trade: SimulationTrade) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Return the header and the rows of the table: time, set-up and the largest error of each quantity."""
-    header = (*HEADER, *(name.upper() for name in trade.quantities), *RECOGNITION, "")
+def simulation_table(trade: SimulationTrade) -> FoundTable:
+    """Return the table: time, set-up, the largest error of each quantity, and recognition."""
     rows = []
     for point in trade.points:
-        errors = [_short(point.errors.get(name, math.nan)) for name in trade.quantities]
         note = point.failure or ("the reference" if point.role == "reference" else "")
         seconds, setup = (
             f"{v:.3g}" if math.isfinite(v) else "-" for v in (1e3 * point.seconds, point.setup_s)
         )
-        recognised = (
-            percent(point.recognised.rate) if point.recognised else "-",
-            point.behind.points if point.behind else "-",
+        rows.append(
+            (
+                *(point.method, point.fidelity, point.step, seconds, setup),
+                *(_percent(point.errors.get(name, math.nan)) for name in trade.quantities),
+                percent(point.recognised.rate) if point.recognised else "-",
+                point.behind.points if point.behind else "-",
+                note,
+            )
         )
-        rows.append((point.method, point.fidelity, point.step, seconds, setup, *errors, *recognised, note))
-    return header, rows
+    errors = (f"{name} [%]" for name in trade.quantities)
+    times = ("time [ms]", "set-up [s]")
+    return FoundTable(
+        id="methods",
+        title="Time and error of each method",
+        header=(
+            "method",
+            "fidelity",
+            "step or accuracy",
+            *times,
+            *errors,
+            "recognised",
+            "behind [points]",
+            "note",
+        ),
+        rows=tuple(rows),
+        note=f"Scenes: {', '.join(trade.scenes)}; {counted(len(trade.seeds), 'seed')} each. Times are of one grasp. "
+        "Errors are the largest ones, in percent of the reference. Behind is the rate of the reference less this one.",
+        numbers=3,
+    )
 
 
-def _short(error: float) -> str:
-    return "-" if math.isnan(error) else ("inf" if math.isinf(error) else f"{error:.1e}")
+def simulation_page(trade: SimulationTrade, answer: str) -> Page:
+    """Return the page; `answer` is the conclusion from the trade-off."""
+    return Page(
+        kind="Trade-off",
+        title=f"Accuracy of {trade.gripper} against its run time",
+        question="What does a less accurate simulation save, and what does it cost?",
+        answer=answer,
+        sections=(
+            simulation_table(trade).section(),
+            Section(id="made", title="Provenance", body=facts(list(trade.made.items()))),
+        ),
+    )
+
+
+def _percent(error: float) -> str:
+    return "-" if math.isnan(error) else ("inf" if math.isinf(error) else f"{100.0 * error:.1e}")
 
 
 def trade_simulation(
