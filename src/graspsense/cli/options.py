@@ -130,9 +130,9 @@ def refuse_typed(names: Collection[str], why: str) -> None:
 def contradiction(settings: Settings, label: str) -> click.UsageError:
     """Return the error for a label that contradicts the object of a simulated gripper."""
     return click.UsageError(
-        f"the label {label} is not what the gripper holds, which is {settings.held}: a "
-        "simulated gripper grasps what it is told, so label and object must agree. Leave --object out to grasp what "
-        "the label says"
+        f"the label {label} contradicts the object {settings.held}, which this simulated gripper is told to hold. An "
+        "object that it knows has its own name as the label; one from a file has any other name, as in my-cup#1. Or "
+        "leave out --object to grasp what the label says"
     )
 
 
