@@ -53,6 +53,8 @@ _QUANTITY: Final = frozenset({
     "merkmal", "gr\u00f6\u00dfe", "messgr\u00f6\u00dfe", "kennwert", "grandeur", "magnitud", "grandezza",
 })  # fmt: skip
 _VALUE: Final = frozenset({"value", "values", "val", "wert", "messwert", "valeur", "valor", "valore"})
+_STAMPS: Final = frozenset({"time", "timestamp", "stamp", "date", "order"})
+"""Names of a column that may tell in which order the trials were recorded."""
 LARGEST_WHOLE: Final = 2.0**53
 """From here on, not every whole number is a number of the computer."""
 
@@ -288,7 +290,9 @@ def _labels(columns: CsvColumns, label: str | None, notes: list[str], *, require
 def _ranks(columns: CsvColumns, order: str | None, notes: list[str]) -> tuple[int, ...]:
     """Return the position of each trial in the order of recording. Raises DataDamaged."""
     if order is None:
-        notes.append("no column names the order of recording: the order of the lines is used")
+        stamps = [option("order", name) for name in columns.names if name.casefold() in _STAMPS]
+        told = f" (give {stamps[0]} if that column does)" if stamps else ""
+        notes.append(f"no column names the order of recording{told}: the order of the lines is used")
         return tuple(range(len(columns)))
     values = columns.numbers(order)
     if any(math.isnan(value) for value in values):
