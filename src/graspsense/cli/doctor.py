@@ -65,7 +65,8 @@ def doctor(timeout_s: float, repetitions: int | None, as_json: bool, **asked: An
         echo_json({"problems": problems, "diagnoses": [_as_json(diagnosis) for diagnosis in diagnoses]})
     else:
         for diagnosis in diagnoses:
-            _print(diagnosis)
+            if diagnosis.given or diagnosis.error:
+                _print(diagnosis)
         echo(f"{problems} problem(s)", Style.BAD) if problems else echo("no problem found", Style.GOOD)
     if problems:
         raise click.exceptions.Exit(ExitCode.CHECK_FAILED)
