@@ -10,7 +10,7 @@ import click
 from attrs import asdict
 
 from graspsense.cli.options import keys_option, pipeline_option
-from graspsense.cli.output import check_outputs, echo_found, echo_json, file_to_write_as
+from graspsense.cli.output import check_outputs, echo_found, echo_values, file_to_write_as, json_option
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import named_source
 from graspsense.cli.terminal import Style, echo, echo_entry, talk
@@ -56,7 +56,7 @@ from graspsense.report.write import write_html
     is_flag=True,
     help="Accept settings outside of their plausible range, and write a scene that the squeezes do not determine.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+@json_option()
 def identify(
     sources: tuple[str, ...],
     out: str,
@@ -68,7 +68,6 @@ def identify(
     gripper: str | None,
     options: tuple[str, ...],
     force: bool,
-    as_json: bool,
 ) -> None:
     """Identify an object from recorded squeezes, and write it as a scene.
 
@@ -98,15 +97,13 @@ def identify(
         write_html(Path(page), identification_page(result, Path(out).name))
     for note in result.notes:
         talk(f"note: {note}")
-    if as_json:
-        echo_json(_as_values(None if refused else out, result))
-    else:
-        _print(result)
-        if not refused:
-            echo_entry("scene", out)
-            echo_entry("use it", f"graspsense run --object {out}")
-        if page:
-            echo_entry("page", page)
+    echo_values(_as_values(None if refused else out, result))
+    _print(result)
+    if not refused:
+        echo_entry("scene", out)
+        echo_entry("use it", f"graspsense run --object {out}")
+    if page:
+        echo_entry("page", page)
     if refused:
         reasons = "".join(f"\n  {reason}" for reason in refused)
         raise ConfigError(f"{out} is not written:{reasons}\n  --force writes it all the same")

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from typing import Any, Final, TypeVar
+from typing import Any, Final
 
 import click
 
-from graspsense.cli.output import file_to_write_as
+from graspsense.cli.output import CommandT, file_to_write_as
 from graspsense.core.settings.layers import Flag
 from graspsense.core.settings.resolved import Settings, resolve
 from graspsense.report.write import require_matplotlib
-
-CommandT = TypeVar("CommandT", bound=Callable[..., Any])
 
 DEFAULT_PIPELINE: Final = "default"
 SEED: Final = click.IntRange(0, 2**32 - 1)

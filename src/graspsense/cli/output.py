@@ -7,19 +7,44 @@ import os
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import click
 
-from graspsense.cli.terminal import StyleOf, echo_as_it_is, echo_table, writes_unicode
+from graspsense.cli.terminal import (
+    StyleOf,
+    echo_table,
+    print_values_alone,
+    results,
+    values_alone,
+    writes_unicode,
+)
 from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.json_values import json_ready
 
 if TYPE_CHECKING:
     from graspsense.report.found_table import FoundTable
 
+CommandT = TypeVar("CommandT", bound=Callable[..., Any])
+
 _PROBE_BYTES: Final = 1 << 16
 """Size of the file by which is tested whether a folder can be written; more than the smallest model."""
+
+
+def json_option(text: str = "Print the result as JSON.") -> Callable[[CommandT], CommandT]:
+    """Return the decorator that adds --json; `text` says what is printed by it, with `echo_values`."""
+
+    def ask(_context: click.Context, _param: click.Parameter, asked: bool) -> None:
+        print_values_alone(asked)
+
+    return click.option("--json", "as_json", is_flag=True, expose_value=False, callback=ask, help=text)
+
+
+def echo_values(value: object, long: bool = False) -> bool:
+    """Print the result of a command as JSON if --json was given, and return whether; its text is then not printed."""
+    if values_alone():
+        echo_json(value, long)
+    return values_alone()
 
 
 def echo_json(value: object, long: bool = False) -> None:
@@ -27,14 +52,13 @@ def echo_json(value: object, long: bool = False) -> None:
 
     A long one comes in one line, which takes a fifth of the time.
     """
-    echo_as_it_is(
-        json.dumps(
-            json_ready(value),
-            indent=None if long else 2,
-            ensure_ascii=not writes_unicode(),
-            allow_nan=False,
-        )
+    text = json.dumps(
+        json_ready(value),
+        indent=None if long else 2,
+        ensure_ascii=not writes_unicode(results()),
+        allow_nan=False,
     )
+    click.echo(text, results())
 
 
 def echo_found(table: FoundTable, styles: Mapping[str, StyleOf] | None = None) -> None:

@@ -265,7 +265,7 @@ def command_line(without: Collection[str], command: str = "") -> str:
     words = ["graspsense", command or str(context.info_name)]
     by_user = set(typed()).difference(without)
     for param in context.command.params:
-        if param.name not in by_user:
+        if param.name not in by_user or not param.expose_value:
             continue
         value = context.params[param.name]
         if isinstance(param, click.Argument):

@@ -17,7 +17,8 @@ import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext, redirect_stdout
 from enum import Enum
-from typing import IO, Final
+from io import TextIOBase
+from typing import IO, Final, cast
 from unicodedata import combining, east_asian_width
 
 import click
@@ -56,23 +57,47 @@ StyleOf = Callable[[str], Style | None]
 """Returns the style of a cell with this text."""
 
 
+class _Nowhere(TextIOBase):
+    """Where text goes that nobody is to read."""
+
+    def write(self, text: str) -> int:
+        return len(text)
+
+
 _results: IO[str] | None = None
+_as_values = False
 
 
 @contextmanager
 def results_alone_on_stdout() -> Iterator[None]:
     """Within this context stdout has what this module prints; what a plugin prints goes to stderr."""
-    global _results
+    global _results, _as_values
     _results = sys.stdout
     try:
         with nullcontext() if sys.stdout is None else redirect_stdout(sys.stderr):
             yield
     finally:
-        _results = None
+        _results, _as_values = None, False
+
+
+def print_values_alone(asked: bool) -> None:
+    """If asked, have stdout get no text until the context of the results ends, only what `results` is sent."""
+    global _as_values
+    _as_values = asked
+
+
+def values_alone() -> bool:
+    """Return whether values are printed in place of text."""
+    return _as_values
+
+
+def results() -> IO[str] | None:
+    """Return the stream of the results of a command."""
+    return _results or sys.stdout
 
 
 def _stream(err: bool = False) -> IO[str] | None:
-    return sys.stderr if err else _results or sys.stdout
+    return sys.stderr if err else cast("IO[str]", _Nowhere()) if _as_values else results()
 
 
 def terminal_width(stream: IO[str] | None) -> int | None:

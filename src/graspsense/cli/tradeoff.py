@@ -9,9 +9,10 @@ import click
 
 from graspsense.cli.experiment import experiment
 from graspsense.cli.options import pipeline_options, settings_of
-from graspsense.cli.output import echo_found, echo_json, page_to_write
+from graspsense.cli.output import echo_found, echo_values, json_option, page_to_write
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.terminal import Subcommands, echo, echo_entry
+from graspsense.report.html import Page
 from graspsense.report.write import write_html
 
 
@@ -40,13 +41,12 @@ def tradeoff() -> None:
     help="Individuals of each object and state, for recognition; 0: leave it out.",
 )
 @click.option("--out", metavar="DIR", help="Write the page DIR/report.html as well.")
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+@json_option()
 def simulation(
     scenes: tuple[str, ...],
     seeds: int,
     instances: int,
     out: str | None,
-    as_json: bool,
     **asked: Any,
 ) -> None:
     """Run the same grasps with several accuracies and step lengths of the simulator.
@@ -55,12 +55,7 @@ def simulation(
     and halves its steps until nothing changes. Times are measured on the same grasps. Recognition is measured with the
     sensors of the gripper: a classifier learns grasps of each accuracy, and is tested on other grasps of the reference.
     """
-    from graspsense.experiments.simulation import (
-        SCENES,
-        simulation_page,
-        simulation_table,
-        trade_simulation,
-    )
+    from graspsense.experiments.simulation import SCENES, simulation_table, trade_simulation
     from graspsense.experiments.simulation_recognition import conclusion, with_recognition
 
     page = None if out is None else page_to_write(out)
@@ -73,15 +68,12 @@ def simulation(
         )
         if instances:
             trade = with_recognition(trade, settings, instances=instances, progress=progress)
-    words = conclusion(trade)
+    words, table = conclusion(trade), simulation_table(trade)
     if page is not None:
-        write_html(page, simulation_page(trade, words))
-    if as_json:
-        echo_json({**trade.as_json(), "page": None if page is None else str(page)})
-        return
-    table = simulation_table(trade)
-    echo(f"{trade.gripper}, simulated. {table.note}")
-    echo(f"{', '.join(f'{key} {value}' for key, value in trade.made.items())}\n")
+        title = f"Accuracy of {trade.gripper} against its run time"
+        write_html(page, Page(kind="Trade-off", title=title, answer=words, sections=(table.section(),)))
+    echo_values({**trade.as_json(), "page": None if page is None else str(page)})
+    echo(f"{trade.gripper}, simulated. {table.note}\n")
     echo_found(table)
     if words:
         echo(f"\n{words}")

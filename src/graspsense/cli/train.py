@@ -20,7 +20,7 @@ from graspsense.cli.choosing import (
     say_chosen,
 )
 from graspsense.cli.options import target_option, typed
-from graspsense.cli.output import check_outputs, echo_json, file_to_write_as
+from graspsense.cli.output import check_outputs, echo_values, file_to_write_as, json_option
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import (
     SIMULATED,
@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from graspsense.core.learn.model import Model
 
 
-_NOT_EVALUATED: Final = ("out", "keep", "overwrite", "as_json", "calibration_instances", "choose")
+_NOT_EVALUATED: Final = ("out", "keep", "overwrite", "calibration_instances", "choose")
 """Options of `train` that `evaluate` does not have."""
 _OF_PIPELINE: Final = ("pipeline", "gripper", "options", "force")
 """Options of `train` that `run` has too."""
@@ -88,7 +88,7 @@ _OF_PIPELINE: Final = ("pipeline", "gripper", "options", "force")
     help="Choose classifier and features by the trials; one that is given by --classifier or -o stays.",
 )
 @source_options
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+@json_option()
 def train(
     source: str,
     out: str,
@@ -99,7 +99,6 @@ def train(
     checkpoints: str | None,
     calibration_instances: int | None,
     choose: bool,
-    as_json: bool,
     **given: Any,
 ) -> None:
     """Train a model, write it, and print what it was trained on."""
@@ -112,7 +111,7 @@ def train(
     if choose:
         refuse_with_choice({**given, "checkpoints": times, "calibration_instances": calibration_instances})
     if given["target_value"]:
-        train_value(source, classifier, out, keep, as_json, given)
+        train_value(source, classifier, out, keep, given)
         return
     _refuse_single_scene(source)
     trained, held_out = (
@@ -134,10 +133,8 @@ def train(
     keep_features(keep, labelled)
     for note in notes:
         talk(f"note: {note}")
-    if as_json:
-        choice = {} if trained is None else {"pipeline": pipeline, "choice": trained.as_values()}
-        echo_json({"model": out, **_as_values(model), "trials": len(labelled), **choice})
-        return
+    choice = {} if trained is None else {"pipeline": pipeline, "choice": trained.as_values()}
+    echo_values({"model": out, **_as_values(model), "trials": len(labelled), **choice})
     _say_trained(out, model)
     if trained is not None:
         say_chosen(trained, pipeline)
@@ -156,7 +153,7 @@ def _maker(learner: SelectedComponent, name: str, target: str, seed: int) -> Cal
         name=name,
         seed=seed,
         target=target,
-        provenance={"command": command_line(("keep", "overwrite", "as_json"))},
+        provenance={"command": command_line(("keep", "overwrite"))},
     )
 
 

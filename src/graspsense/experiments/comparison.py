@@ -56,11 +56,7 @@ class ConditionDifference:
     @property
     def verdict(self) -> str:
         """Whether the rate is shown to be higher or lower, in words; `equal` where every seed has the same answers."""
-        answers, others = (
-            {seed: result.confusion for seed, result in condition.by_seed.items()}
-            for condition in (self.base, self.other)
-        )
-        if answers == others:
+        if self.base.by_seed == self.other.by_seed:
             return "equal"
         interval = self.difference.interval
         if interval is None or interval[0] <= 0.0 <= interval[1]:

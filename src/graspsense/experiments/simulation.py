@@ -17,7 +17,6 @@ from graspsense.core.values.errors import ConfigError, counted, named
 from graspsense.evaluation.intervals import Difference, RecognitionRate, percent
 from graspsense.experiments.versions import measured_on
 from graspsense.report.found_table import FoundTable
-from graspsense.report.html import Page, Section, facts
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -86,54 +85,31 @@ class SimulationTrade:
 
 def simulation_table(trade: SimulationTrade) -> FoundTable:
     """Return the table: time, set-up, the largest error of each quantity, and recognition."""
-    rows = []
-    for point in trade.points:
-        note = point.failure or ("the reference" if point.role == "reference" else "")
-        seconds, setup = (
-            f"{v:.3g}" if math.isfinite(v) else "-" for v in (1e3 * point.seconds, point.setup_s)
-        )
-        rows.append(
-            (
-                *(point.method, point.fidelity, point.step, seconds, setup),
-                *(_percent(point.errors.get(name, math.nan)) for name in trade.quantities),
-                percent(point.recognised.rate) if point.recognised else "-",
-                point.behind.points if point.behind else "-",
-                note,
-            )
-        )
     errors = (f"{name} [%]" for name in trade.quantities)
-    times = ("time [ms]", "set-up [s]")
+    made = ", ".join(f"{key} {value}" for key, value in trade.made.items())
     return FoundTable(
         id="methods",
         title="Time and error of each method",
         header=(
-            "method",
-            "fidelity",
-            "step or accuracy",
-            *times,
-            *errors,
-            "recognised",
-            "behind [points]",
-            "note",
+            *("method", "fidelity", "step or accuracy", "time [ms]", "set-up [s]"),
+            *(*errors, "recognised", "behind [points]", "note"),
         ),
-        rows=tuple(rows),
+        rows=tuple(_cells(point, trade.quantities) for point in trade.points),
         note=f"Scenes: {', '.join(trade.scenes)}; {counted(len(trade.seeds), 'seed')} each. Times are of one grasp. "
-        "Errors are the largest ones, in percent of the reference. Behind is the rate of the reference less this one.",
+        "Errors are the largest ones, in percent of the reference. Behind is the rate of the reference less this one. "
+        f"Made with: {made}.",
         numbers=3,
     )
 
 
-def simulation_page(trade: SimulationTrade, answer: str) -> Page:
-    """Return the page; `answer` is the conclusion from the trade-off."""
-    return Page(
-        kind="Trade-off",
-        title=f"Accuracy of {trade.gripper} against its run time",
-        question="What does a less accurate simulation save, and what does it cost?",
-        answer=answer,
-        sections=(
-            simulation_table(trade).section(),
-            Section(id="made", title="Provenance", body=facts(list(trade.made.items()))),
-        ),
+def _cells(point: VariantPoint, quantities: Sequence[str]) -> tuple[str, ...]:
+    seconds, setup = (f"{v:.3g}" if math.isfinite(v) else "-" for v in (1e3 * point.seconds, point.setup_s))
+    return (
+        *(point.method, point.fidelity, point.step, seconds, setup),
+        *(_percent(point.errors.get(name, math.nan)) for name in quantities),
+        percent(point.recognised.rate) if point.recognised else "-",
+        point.behind.points if point.behind else "-",
+        point.failure or ("the reference" if point.role == "reference" else ""),
     )
 
 
