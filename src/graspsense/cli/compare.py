@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from graspsense.cli.output import echo_found, echo_values, file_to_write_as, json_option
+from graspsense.cli.output import echo_found, echo_values, file_to_write, json_option
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import (
     DEFAULT_CLASSIFIER,
@@ -55,7 +55,7 @@ DEFAULT_FEATURES: Final = ("chitta", "columns")
 )
 @click.option("--feature-sets", metavar="NAMES", help="Comma-separated feature sets; not for a CSV. [chitta]")
 @folds_option
-@click.option("--out", metavar="FILE.html", callback=file_to_write_as(".html"), help="Write a page as well.")
+@click.option("--out", metavar="FILE.html", callback=file_to_write(".html"), help="Write a page as well.")
 @source_options
 @json_option()
 def compare(

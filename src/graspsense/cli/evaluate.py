@@ -10,7 +10,7 @@ import click
 
 from graspsense.cli.events import evaluate_events
 from graspsense.cli.options import Seconds, refuse_typed, target_option
-from graspsense.cli.output import check_outputs, echo_values, file_to_write_as, json_option, page_to_write
+from graspsense.cli.output import check_outputs, echo_values, file_to_write, json_option, page_to_write
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import (
     SOURCES,
@@ -53,9 +53,7 @@ if TYPE_CHECKING:
 @source_argument
 @target_option("What is recognised: whole labels, classes, or the states within each class.")
 @folds_option
-@click.option(
-    "--png", metavar="FILE.png", callback=file_to_write_as(".png"), help="Draw the confusion matrix."
-)
+@click.option("--png", metavar="FILE.png", callback=file_to_write(".png"), help="Draw the confusion matrix.")
 @click.option("--report", metavar="DIR", help="Write the page DIR/report.html as well.")
 @keep_option
 @click.option("--overwrite", is_flag=True, help="Replace the file of --keep if it exists.")

@@ -12,7 +12,7 @@ import click
 
 from graspsense.cli.live import Live, LiveOptions, live_options, shown_live
 from graspsense.cli.options import force_option, keys_option
-from graspsense.cli.output import echo_found, echo_values, file_to_write_as, json_option
+from graspsense.cli.output import echo_found, echo_values, file_to_write, json_option
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.terminal import Style, echo, echo_entry, echo_table, talk
 from graspsense.core.files.whole_file import SaveFailed
@@ -297,7 +297,7 @@ DEFAULT_PAGE = "comparison.html"
     metavar="FILE.html",
     default=DEFAULT_PAGE,
     show_default=True,
-    callback=file_to_write_as(".html"),
+    callback=file_to_write(".html"),
     help="The page.",
 )
 @json_option("Print the comparison as JSON.")

@@ -10,7 +10,7 @@ import click
 from attrs import asdict
 
 from graspsense.cli.options import keys_option, pipeline_option
-from graspsense.cli.output import check_outputs, echo_found, echo_values, file_to_write_as, json_option
+from graspsense.cli.output import check_outputs, echo_found, echo_values, file_to_write, json_option
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import named_source
 from graspsense.cli.terminal import Style, echo, echo_entry, talk
@@ -29,7 +29,7 @@ from graspsense.report.write import write_html
     "sources", nargs=-1, required=True, metavar="RECORDING|store:DIR|DIR#N...", callback=named_source
 )
 @click.option(
-    "--out", metavar="FILE.toml", callback=file_to_write_as(".toml"), required=True, help="File of the scene."
+    "--out", metavar="FILE.toml", callback=file_to_write(".toml"), required=True, help="File of the scene."
 )
 @click.option(
     "--class",
@@ -44,9 +44,7 @@ from graspsense.report.write import write_html
     multiple=True,
     help="Squeezes of a rigid block, from which the fingertips are identified first. Can be repeated.",
 )
-@click.option(
-    "--page", metavar="FILE.html", callback=file_to_write_as(".html"), help="Write the report page."
-)
+@click.option("--page", metavar="FILE.html", callback=file_to_write(".html"), help="Write the report page.")
 @click.option("--overwrite", is_flag=True, help="Replace the files of --out and --page if they exist.")
 @pipeline_option("Pipeline with the simulated gripper.  [default: default]")
 @click.option("--gripper", metavar="NAME", help="Another simulated gripper. (gripper.type)")

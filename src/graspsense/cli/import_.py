@@ -14,7 +14,7 @@ from attrs import asdict, frozen
 
 from graspsense.cli.import_check import echo_channels, show_files, suggest_manifest
 from graspsense.cli.options import keys_option, pipeline_option
-from graspsense.cli.output import echo_values, file_to_write_as, json_option
+from graspsense.cli.output import echo_values, file_to_write, json_option
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.run import draw_grasp
 from graspsense.cli.sources import named_source
@@ -70,7 +70,7 @@ FEW: Final = 3
 @click.option(
     "--plot",
     metavar="FILE.png",
-    callback=file_to_write_as(".png"),
+    callback=file_to_write(".png"),
     help="--check: the picture.  [default: import-check.png]",
 )
 @click.option("--label", metavar="CLASS:STATE", help="Label of the object: can:full_open#2.")

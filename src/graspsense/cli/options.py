@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import click
 
-from graspsense.cli.output import CommandT, file_to_write_as
+from graspsense.cli.output import CommandT, file_to_write
 from graspsense.core.settings.layers import Flag
 from graspsense.core.settings.resolved import Settings, resolve
 from graspsense.report.write import require_matplotlib
@@ -84,7 +84,7 @@ pipeline_options = option_group(
 def _picture_to_write(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
     if value is not None:
         require_matplotlib()
-    return file_to_write_as(".png")(ctx, param, value)
+    return file_to_write(".png")(ctx, param, value)
 
 
 plot_option = click.option(

@@ -71,42 +71,42 @@ def echo_found(table: FoundTable, styles: Mapping[str, StyleOf] | None = None) -
     echo_table(header, table.rows, styles)
 
 
-def file_to_write(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
-    """Callback of an option that names a file: refuse a file that cannot be written, before the work and not after.
+def file_to_write(
+    ending: str = "",
+) -> Callable[[click.Context, click.Parameter, str | None], str | None]:
+    """Return the callback of an option that names a file, of one format if it has to have an ending such as `.html`.
 
-    A pipe or a device is refused as well: the file that is written takes its place, also where root could replace it.
+    A file that cannot be written is refused before the work and not after. So is a pipe or a device: the file that is
+    written takes its place, also where root could replace it.
     """
-    if value is None:
-        return None
-    path = Path(value)
-    if path.is_dir():
-        raise click.BadParameter(f"{value} is a folder: name a file in it", ctx, param)
-    if path.exists() and not path.is_file():
-        raise click.BadParameter(f"{value} is a pipe or a device: name a file", ctx, param)
-    if not path.parent.is_dir():
-        raise click.BadParameter(f"{value} cannot be written: there is no folder {path.parent}", ctx, param)
-    try:
-        _probe(path.parent)
-    except OSError as error:
-        raise click.BadParameter(f"{value} cannot be written: {error.strerror}", ctx, param) from error
-    return value
+
+    def checked(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
+        if value is None:
+            return None
+        path = Path(value)
+        if ending and path.suffix.lower() != ending:
+            raise click.BadParameter(f"{value}: the name of the file must end in {ending}", ctx, param)
+        if path.is_dir():
+            raise click.BadParameter(f"{value} is a folder: name a file in it", ctx, param)
+        if path.exists() and not path.is_file():
+            raise click.BadParameter(f"{value} is a pipe or a device: name a file", ctx, param)
+        if not path.parent.is_dir():
+            raise click.BadParameter(
+                f"{value} cannot be written: there is no folder {path.parent}", ctx, param
+            )
+        try:
+            _probe(path.parent)
+        except OSError as error:
+            raise click.BadParameter(f"{value} cannot be written: {error.strerror}", ctx, param) from error
+        return value
+
+    return checked
 
 
 def _probe(folder: Path) -> None:
     """Raise OSError if no file can be written in this folder."""
     with tempfile.TemporaryFile(dir=folder) as probe:
         probe.write(bytes(_PROBE_BYTES))
-
-
-def file_to_write_as(ending: str) -> Callable[[click.Context, click.Parameter, str | None], str | None]:
-    """Return the callback of an option that names a file of one format, given by its ending such as `.html`."""
-
-    def checked(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
-        if value is not None and Path(value).suffix.lower() != ending:
-            raise click.BadParameter(f"{value}: the name of the file must end in {ending}", ctx, param)
-        return file_to_write(ctx, param, value)
-
-    return checked
 
 
 def page_to_write(folder: str) -> Path:

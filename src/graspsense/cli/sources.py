@@ -128,7 +128,7 @@ folds_option = click.option(
 keep_option = click.option(
     "--keep",
     metavar="FILE",
-    callback=file_to_write,
+    callback=file_to_write(),
     help="Write the features of all trials as a CSV file.",
 )
 """The file that `keep_features` writes."""

@@ -20,7 +20,7 @@ from graspsense.cli.choosing import (
     say_chosen,
 )
 from graspsense.cli.options import target_option, typed
-from graspsense.cli.output import check_outputs, echo_values, file_to_write_as, json_option
+from graspsense.cli.output import check_outputs, echo_values, file_to_write, json_option
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import (
     SIMULATED,
@@ -69,7 +69,7 @@ _OF_PIPELINE: Final = ("pipeline", "gripper", "options", "force")
 )
 @source_argument
 @click.option(
-    "--out", metavar="FILE.json", callback=file_to_write_as(".json"), required=True, help="File of the model."
+    "--out", metavar="FILE.json", callback=file_to_write(".json"), required=True, help="File of the model."
 )
 @keep_option
 @click.option("--overwrite", is_flag=True, help="Replace the files of --out and --keep if they exist.")
