@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from graspsense.cli.options import refuse_typed
 from graspsense.cli.output import echo_found, echo_values, file_to_write, json_option
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import (
@@ -71,10 +72,7 @@ def compare(
 
     if feature_sets and is_csv(source):
         raise click.UsageError("--feature-sets is not for a CSV source, which has its features as columns")
-    if given["target_value"]:
-        raise click.UsageError(
-            "compare is for classifiers; --target-value is for train, predict and evaluate"
-        )
+    refuse_typed(["target_value"], "is for train, predict and evaluate: compare is for classifiers")
     names = _names(classifiers, "--classifiers", "classifier")
     learners = {name: learner_of(source, name, given) for name in names}
     with ProgressLine() as progress:

@@ -94,14 +94,11 @@ def evaluate(
     from graspsense.core.learn.checkpoints import checkpoints_of
 
     check_outputs(keep, overwrite=overwrite, sources=[source])
-    page = None if report is None else page_to_write(report)
-    times = checkpoints_of(checkpoints)
     if given["target_value"]:
-        if page is not None:
-            raise click.UsageError("--report is for labels, and not for --target-value")
-
         evaluate_value(source, classifier, folds, keep, given)
         return
+    page = None if report is None else page_to_write(report)
+    times = checkpoints_of(checkpoints)
     learner = learner_of(source, classifier, given)
     with ProgressLine() as progress:
         labelled = trials_of(source, progress, given, times, folds)

@@ -13,7 +13,7 @@ import click
 from attrs import asdict, frozen
 
 from graspsense.cli.import_check import echo_channels, show_files, suggest_manifest
-from graspsense.cli.options import keys_option, pipeline_option
+from graspsense.cli.options import keys_option, pipeline_option, refuse_typed
 from graspsense.cli.output import echo_values, file_to_write, json_option
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.run import draw_grasp
@@ -121,8 +121,8 @@ def import_(
         raise click.UsageError(
             "name a store for the trials: --save DIR. Or look at the recordings first: --check"
         )
-    if plot is not None and not check:
-        raise click.UsageError("--plot is for --check")
+    if not check:
+        refuse_typed(["plot"], "is for --check")
     if label is not None:
         labels_of(label)  # what is not a label is refused as such, before any file is read
     chosen = _Chosen(pipeline, options)

@@ -25,7 +25,7 @@ from graspsense.regression.results import RegressionEvaluation, error_of
 if TYPE_CHECKING:
     from graspsense.regression.model import PredictedValue, RegressionModel
 
-_FOR_LABELS: Final = ("png", "target", "checkpoints")
+_FOR_LABELS: Final = ("png", "report", "target", "checkpoints")
 
 
 def _estimator(named: str | None, options: Sequence[str]) -> str:

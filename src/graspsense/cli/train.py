@@ -16,10 +16,9 @@ from graspsense.cli.choosing import (
     chosen,
     pipeline_beside,
     pipeline_text,
-    refuse_with_choice,
     say_chosen,
 )
-from graspsense.cli.options import target_option, typed
+from graspsense.cli.options import refuse_typed, target_option, typed
 from graspsense.cli.output import check_outputs, echo_values, file_to_write, json_option
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import (
@@ -109,7 +108,7 @@ def train(
     check_outputs(out, keep, pipeline, overwrite=overwrite, sources=[source])
     times = checkpoints_of(checkpoints)
     if choose:
-        refuse_with_choice({**given, "checkpoints": times, "calibration_instances": calibration_instances})
+        refuse_typed(("checkpoints", "calibration_instances", "target_value"), "does not go with --choose")
     if given["target_value"]:
         train_value(source, classifier, out, keep, given)
         return
