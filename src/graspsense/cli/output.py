@@ -14,8 +14,8 @@ import click
 from graspsense.cli.terminal import (
     StyleOf,
     echo_table,
+    echo_text_of_values,
     print_values_alone,
-    results,
     values_alone,
     writes_unicode,
 )
@@ -55,10 +55,10 @@ def echo_json(value: object, long: bool = False) -> None:
     text = json.dumps(
         json_ready(value),
         indent=None if long else 2,
-        ensure_ascii=not writes_unicode(results()),
+        ensure_ascii=not writes_unicode(),
         allow_nan=False,
     )
-    click.echo(text, results())
+    echo_text_of_values(text)
 
 
 def echo_found(table: FoundTable, styles: Mapping[str, StyleOf] | None = None) -> None:

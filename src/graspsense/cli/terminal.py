@@ -81,7 +81,7 @@ def results_alone_on_stdout() -> Iterator[None]:
 
 
 def print_values_alone(asked: bool) -> None:
-    """If asked, have stdout get no text until the context of the results ends, only what `results` is sent."""
+    """If asked, have stdout get no text until the context of the results ends, only values."""
     global _as_values
     _as_values = asked
 
@@ -91,13 +91,8 @@ def values_alone() -> bool:
     return _as_values
 
 
-def results() -> IO[str] | None:
-    """Return the stream of the results of a command."""
-    return _results or sys.stdout
-
-
 def _stream(err: bool = False) -> IO[str] | None:
-    return sys.stderr if err else cast("IO[str]", _Nowhere()) if _as_values else results()
+    return sys.stderr if err else cast("IO[str]", _Nowhere()) if _as_values else _results or sys.stdout
 
 
 def terminal_width(stream: IO[str] | None) -> int | None:
@@ -120,7 +115,7 @@ def can_redraw(stream: IO[str] | None) -> bool:
 
 def writes_unicode(stream: IO[str] | None = None) -> bool:
     """Return whether the encoding of the stream, by default that of the results, has every character."""
-    return (getattr(stream or _stream(), "encoding", None) or "ascii").lower().startswith("utf")
+    return (getattr(stream or _results or sys.stdout, "encoding", None) or "ascii").lower().startswith("utf")
 
 
 def block(stream: IO[str] | None) -> str:
@@ -173,6 +168,11 @@ def echo_entries(label: str, texts: Iterable[str], style: Style | None = None) -
 def echo_as_it_is(text: str, *, err: bool = False, end: str = "\n") -> None:
     """Print text that is neither wrapped nor coloured, such as a path, a command or a file that the output is."""
     click.echo(printable(text) + end, _stream(err), nl=False)
+
+
+def echo_text_of_values(text: str) -> None:
+    """Print what values are written as, also where `print_values_alone` keeps all other text from stdout."""
+    click.echo(printable(text), _results or sys.stdout)
 
 
 def echo_in_place(line: str) -> None:
