@@ -227,10 +227,9 @@ def pipeline_text(chosen: Chosen, model: str) -> str:
         **plain(learner.config),
         "model": os.path.realpath(model),
     }
-    rate = chosen.choice.rate.words
     lines = [
         f"# Chosen by graspsense train --choose from {chosen.labelled.source}.".replace("\n", " "),
-        f"# The rate of the whole procedure is {rate}.",
+        f"# The rate of the whole procedure is {chosen.choice.rate.words}.",
         *toml_lines({"extends": "default", **settings}),
     ]
     return "\n".join(lines) + "\n"

@@ -16,7 +16,6 @@ from graspsense.core.control.garbage_collection import no_collection
 from graspsense.core.settings.resolved import Settings
 from graspsense.core.values.errors import ExitCode, GraspsenseError
 
-MARKS: Final = {"ok": "ok", "note": "note", "problem": "PROBLEM"}
 _MARK: Final = 11
 """Width of a mark with its margins."""
 
@@ -135,7 +134,8 @@ def _print(diagnosis: HookAnswer[Finding]) -> None:
         echo_entry("  PROBLEM", f"could not look: {diagnosis.error}", Style.BAD, width=_MARK)
     for finding in diagnosis.given:
         style = None if finding.state == "ok" else state_style(finding.state)
-        echo_entry(f"  {MARKS[finding.state]}", f"{finding.subject}: {finding.words}", style, width=_MARK)
+        mark = "PROBLEM" if finding.state == "problem" else finding.state
+        echo_entry(f"  {mark}", f"{finding.subject}: {finding.words}", style, width=_MARK)
         if finding.state != "ok" and finding.advice:
             if "\n" in finding.advice:
                 for line in filter(None, finding.advice.split("\n")):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -140,16 +139,13 @@ def _print(result: Identification) -> None:
 
 
 def _as_values(out: str | None, result: Identification) -> dict[str, Any]:
-    def values(items: Sequence[Any]) -> list[dict[str, Any]]:
-        return [asdict(item) for item in items]
-
     return {
         "scene": out,
         "label": result.label,
         "seconds": result.seconds,
-        "parameters": values(result.parameters),
-        "candidates": values(result.candidates),
-        "undetermined": values(result.undetermined),
+        "parameters": list(map(asdict, result.parameters)),
+        "candidates": list(map(asdict, result.candidates)),
+        "undetermined": list(map(asdict, result.undetermined)),
         "fits": [{"name": fit.name, "rms_n": fit.rms_n, "peak_n": fit.peak_n} for fit in result.fits],
         "held_out": list(result.held_out),
         "refusals": list(result.refusals),

@@ -17,8 +17,8 @@ import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext, redirect_stdout
 from enum import Enum
-from io import TextIOBase
-from typing import IO, Final, cast
+from io import StringIO
+from typing import IO, Final
 from unicodedata import combining, east_asian_width
 
 import click
@@ -57,13 +57,6 @@ StyleOf = Callable[[str], Style | None]
 """Returns the style of a cell with this text."""
 
 
-class _Nowhere(TextIOBase):
-    """Where text goes that nobody is to read."""
-
-    def write(self, text: str) -> int:
-        return len(text)
-
-
 _results: IO[str] | None = None
 _as_values = False
 
@@ -92,7 +85,7 @@ def values_alone() -> bool:
 
 
 def _stream(err: bool = False) -> IO[str] | None:
-    return sys.stderr if err else cast("IO[str]", _Nowhere()) if _as_values else _results or sys.stdout
+    return sys.stderr if err else StringIO() if _as_values else _results or sys.stdout
 
 
 def terminal_width(stream: IO[str] | None) -> int | None:

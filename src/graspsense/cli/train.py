@@ -51,8 +51,6 @@ if TYPE_CHECKING:
 
 _NOT_EVALUATED: Final = ("out", "keep", "overwrite", "calibration_instances", "choose")
 """Options of `train` that `evaluate` does not have."""
-_OF_PIPELINE: Final = ("pipeline", "gripper", "options", "force")
-"""Options of `train` that `run` has too."""
 
 
 @click.command(
@@ -113,10 +111,8 @@ def train(
         train_value(source, classifier, out, keep, given)
         return
     _refuse_single_scene(source)
-    trained, held_out = (
-        chosen(source, classifier, given, partial(_with_target, target=target)) if choose else None,
-        None,
-    )
+    trained = chosen(source, classifier, given, partial(_with_target, target=target)) if choose else None
+    held_out = None
     if trained is not None:
         learner, labelled = trained.learner, trained.labelled
     else:
@@ -162,7 +158,8 @@ def _say_what_next(source: str, out: str, model: Model, *, default: bool) -> Non
 
     use = f"graspsense predict {shlex.quote(out)} OTHER.csv"
     if not is_csv(source):
-        use = command_line({*typed()}.difference(_OF_PIPELINE), "run")
+        of_run = ("pipeline", "gripper", "options", "force")
+        use = command_line({*typed()}.difference(of_run), "run")
         use += f" -o classifier.type={model.component} -o classifier.model={shlex.quote(out)}"
         use += "" if kind_of(source) == SIMULATED else "   (and the pipeline of these trials)"
     # In one line each, so that they can be copied.

@@ -141,13 +141,8 @@ def compare_experiments(paths: Sequence[str]) -> ExperimentComparison:
     folders = [_folder(path) for path in paths]
     if len(folders) < 2:
         raise ConfigError("give at least two experiments to compare: graspsense experiment compare A B")
-    seen: dict[Path, str] = {}
-    for path, folder in zip(paths, folders, strict=True):
-        if folder.resolve() in seen:
-            raise ConfigError(
-                f"{seen[folder.resolve()]} and {path} are the same experiment: name different ones"
-            )
-        seen[folder.resolve()] = path
+    if len({folder.resolve() for folder in folders}) < len(folders):
+        raise ConfigError(f"two of {', '.join(paths)} are the same experiment: name different ones")
     short = [folder.resolve().name for folder in folders]
     names = short if len(set(short)) == len(short) else [str(folder) for folder in folders]
     experiments = tuple(_read(name, folder) for name, folder in zip(names, folders, strict=True))

@@ -106,15 +106,11 @@ def _cells(point: VariantPoint, quantities: Sequence[str]) -> tuple[str, ...]:
     seconds, setup = (f"{v:.3g}" if math.isfinite(v) else "-" for v in (1e3 * point.seconds, point.setup_s))
     return (
         *(point.method, point.fidelity, point.step, seconds, setup),
-        *(_percent(point.errors.get(name, math.nan)) for name in quantities),
+        *(f"{100.0 * point.errors[name]:.1e}" if name in point.errors else "-" for name in quantities),
         percent(point.recognised.rate) if point.recognised else "-",
         point.behind.points if point.behind else "-",
         point.failure or ("the reference" if point.role == "reference" else ""),
     )
-
-
-def _percent(error: float) -> str:
-    return "-" if math.isnan(error) else ("inf" if math.isinf(error) else f"{100.0 * error:.1e}")
 
 
 def trade_simulation(

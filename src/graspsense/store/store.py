@@ -254,8 +254,8 @@ class Store:
             f"SELECT id {query} AND detail.trial IS NULL AND set_aside IS NULL", values
         ):
             raise DataDamaged(
-                f"trial {lost} of {self.folder} has lost its details, such as its settings: graspsense verify "
-                f"{self.folder} tells of all. To do without it: graspsense trials aside {self.folder}#{lost} --why lost"
+                f"trial {lost} of {self.folder} has lost its details, such as its settings. To do without it: "
+                f"graspsense trials aside {self.folder}#{lost} --why lost"
             )
         rows = self.query(f"SELECT {selected} {query} AND detail.trial IS NOT NULL ORDER BY id", values)
         return dict(zip(names, zip(*rows, strict=True) if rows else [()] * len(names), strict=True))

@@ -104,9 +104,8 @@ def _how_to_train(settings: Settings, out: str) -> str:
     """Return the commands that make a model for these settings: of simulated trials where the gripper is simulated."""
     assert settings.classifier is not None
     learner = settings.classifier.component.name
-    own = settings.pipeline != "default"
-    selected = [f"--pipeline {shlex.quote(settings.pipeline)}"] if own else []
-    if not own or settings.origins["gripper.type"].startswith("-"):
+    selected = [] if settings.pipeline == "default" else [f"--pipeline {shlex.quote(settings.pipeline)}"]
+    if not selected or settings.origins["gripper.type"].startswith("-"):
         selected.append(f"--gripper {settings.gripper.component.name}")
     for part in (settings.gripper, settings.controller, settings.features):
         table = part.component.table

@@ -150,11 +150,14 @@ class Merged:
     values: dict[str, Any] = field(factory=dict)
     owner: dict[KeyPath, Layer] = field(factory=dict)
 
-    def add(self, path: KeyPath, values: Mapping[str, Any], layer: Layer) -> None:
-        """Merge the values of a later layer; `path` is that of the table. Tables are merged, lists replaced."""
-        self._add(self.values, path, values, layer)
+    def add(
+        self, path: KeyPath, values: Mapping[str, Any], layer: Layer, into: dict[str, Any] | None = None
+    ) -> None:
+        """Merge the values of a later layer. Tables are merged, lists replaced.
 
-    def _add(self, into: dict[str, Any], path: KeyPath, values: Mapping[str, Any], layer: Layer) -> None:
+        `path` is that of the table, and `into` the table where it is one within the values.
+        """
+        into = self.values if into is None else into
         self.owner[path] = layer
         for key, value in values.items():
             here = (*path, key)
@@ -162,7 +165,7 @@ class Merged:
                 inner = into.get(key)
                 if not isinstance(inner, dict):
                     inner = into[key] = {}
-                self._add(inner, here, value, layer)
+                self.add(here, value, layer, inner)
             else:
                 was_table = isinstance(into.get(key), dict)
                 into[key] = value

@@ -53,8 +53,6 @@ _QUANTITY: Final = frozenset({
     "merkmal", "gr\u00f6\u00dfe", "messgr\u00f6\u00dfe", "kennwert", "grandeur", "magnitud", "grandezza",
 })  # fmt: skip
 _VALUE: Final = frozenset({"value", "values", "val", "wert", "messwert", "valeur", "valor", "valore"})
-_STAMPS: Final = frozenset({"time", "timestamp", "stamp", "date", "order"})
-"""Names of a column that may tell in which order the trials were recorded."""
 LARGEST_WHOLE: Final = 2.0**53
 """From here on, not every whole number is a number of the computer."""
 
@@ -290,7 +288,8 @@ def _labels(columns: CsvColumns, label: str | None, notes: list[str], *, require
 def _ranks(columns: CsvColumns, order: str | None, notes: list[str]) -> tuple[int, ...]:
     """Return the position of each trial in the order of recording. Raises DataDamaged."""
     if order is None:
-        stamps = [option("order", name) for name in columns.names if name.casefold() in _STAMPS]
+        usual = ("time", "timestamp", "stamp", "date", "order")
+        stamps = [option("order", name) for name in columns.names if name.casefold() in usual]
         told = f" (give {stamps[0]} if that column does)" if stamps else ""
         notes.append(f"no column names the order of recording{told}: the order of the lines is used")
         return tuple(range(len(columns)))
