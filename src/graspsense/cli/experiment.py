@@ -105,9 +105,9 @@ def experiment(
         page, problem = _written_page(summary, results)
         more = findings_of(summary)
         shown.told("progress", {"text": answer(summary) if more is None else more.answer})
-    findings = {} if more is None else {"answer": more.answer, "findings": dict(more.values)}
-    place = None if page is None else str(page)
-    echo_values({**summary.as_json(), **findings, "page": place, **_counts(account, problem)})
+    findings: dict[str, Any] = {} if more is None else {"answer": more.answer, "findings": dict(more.values)}
+    findings["page"] = None if page is None else str(page)
+    echo_values({**summary.as_json(), **findings, **_counts(account, problem)})
     _print(summary, more, account, f"none: {problem}" if problem else str(page))
     if account.stopped == "interrupted":
         raise click.exceptions.Exit(ExitCode.INTERRUPTED)

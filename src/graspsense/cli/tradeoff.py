@@ -12,7 +12,7 @@ from graspsense.cli.options import pipeline_options, settings_of
 from graspsense.cli.output import echo_found, echo_values, json_option, page_to_write
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.terminal import Subcommands, echo, echo_entry
-from graspsense.report.html import Page
+from graspsense.report.html import Page, Section, facts
 from graspsense.report.write import write_html
 
 
@@ -70,10 +70,12 @@ def simulation(
             trade = with_recognition(trade, settings, instances=instances, progress=progress)
     words, table = conclusion(trade), simulation_table(trade)
     if page is not None:
-        title = f"Accuracy of {trade.gripper} against its run time"
-        write_html(page, Page(kind="Trade-off", title=title, answer=words, sections=(table.section(),)))
+        made = Section(id="made", title="Provenance", body=facts(list(trade.made.items())))
+        sections, title = (table.section(), made), f"Accuracy of {trade.gripper} against its run time"
+        write_html(page, Page(kind="Trade-off", title=title, answer=words or table.note, sections=sections))
     echo_values({**trade.as_json(), "page": None if page is None else str(page)})
-    echo(f"{trade.gripper}, simulated. {table.note}\n")
+    echo(f"{trade.gripper}, simulated. {table.note}")
+    echo(f"{', '.join(f'{key} {value}' for key, value in trade.made.items())}\n")
     echo_found(table)
     if words:
         echo(f"\n{words}")

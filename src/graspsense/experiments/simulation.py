@@ -86,7 +86,6 @@ class SimulationTrade:
 def simulation_table(trade: SimulationTrade) -> FoundTable:
     """Return the table: time, set-up, the largest error of each quantity, and recognition."""
     errors = (f"{name} [%]" for name in trade.quantities)
-    made = ", ".join(f"{key} {value}" for key, value in trade.made.items())
     return FoundTable(
         id="methods",
         title="Time and error of each method",
@@ -96,8 +95,7 @@ def simulation_table(trade: SimulationTrade) -> FoundTable:
         ),
         rows=tuple(_cells(point, trade.quantities) for point in trade.points),
         note=f"Scenes: {', '.join(trade.scenes)}; {counted(len(trade.seeds), 'seed')} each. Times are of one grasp. "
-        "Errors are the largest ones, in percent of the reference. Behind is the rate of the reference less this one. "
-        f"Made with: {made}.",
+        "Errors are the largest ones, in percent of the reference. Behind is the rate of the reference less this one.",
         numbers=3,
     )
 
