@@ -65,7 +65,7 @@ def ros2(
             if offered:
                 click.echo(f"offered: {name}", err=True)
         gripper = loaded.settings.gripper.component.qualified
-        click.echo(f"waiting for requests: gripper {gripper} is opened at the first one. Ctrl-C ends it", err=True)
+        click.echo(f"waiting: gripper {gripper} is opened at the first request. Ctrl-C ends it", err=True)
         server.serve()
     except KeyboardInterrupt:
         click.echo("", err=True)
