@@ -8,7 +8,7 @@ from attrs import evolve
 
 from graspsense.cli.main import main
 from graspsense.evaluation.intervals import Difference
-from graspsense.experiments.simulation import PEAK, TRACE, SimulationTrade, VariantPoint, simulation_rows
+from graspsense.experiments.simulation import PEAK, TRACE, SimulationTrade, VariantPoint, simulation_table
 from graspsense.experiments.simulation_recognition import conclusion
 
 QUANTITIES = ("p_first", "delta_t", PEAK, TRACE)
@@ -45,12 +45,13 @@ TRADE = SimulationTrade(
 
 
 def test_a_row_says_time_set_up_errors_and_what_failed():
-    header, rows = simulation_rows(TRADE)
-    assert header[3:5] == ("MS A GRASP", "SET-UP, S")
+    table = simulation_table(TRADE)
+    header, rows = table.header, table.rows
+    assert header[3:6] == ("time [ms]", "set-up [s]", "p_first [%]")
     assert len(rows) == len(TRADE.points)
     assert all(len(row) == len(header) for row in rows)
     by_step = {(row[0], row[2]): row for row in rows}
-    assert by_step["even", "1 ms"][3:7] == ("1", "12.5", "1.0e-02", "1.0e-02")
+    assert by_step["even", "1 ms"][3:7] == ("1", "12.5", "1.0e+00", "1.0e+00")
     assert by_step["even", "5 ms"][-1] == "no number in the force trace"
     assert by_step["broken", "1 ms"][3:7] == ("-", "12.5", "-", "-")
 

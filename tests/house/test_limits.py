@@ -39,7 +39,6 @@ MANY_PARAMETERS = {
     "graspsense/cli/experiment.py:experiment": OPTIONS,
     "graspsense/cli/identify.py:identify": OPTIONS,
     "graspsense/cli/import_.py:import_": OPTIONS,
-    "graspsense/cli/plugins.py:check": OPTIONS,
     "graspsense/cli/report.py:report": OPTIONS,
     "graspsense/cli/run.py:run": OPTIONS,
     "graspsense/cli/train.py:train": OPTIONS,

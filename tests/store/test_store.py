@@ -73,6 +73,17 @@ def test_only_complete_grasps_that_ended_by_themselves_and_are_not_set_aside_cou
     assert verify_store(store.folder).problems == ()
 
 
+def test_a_trial_without_details_is_named_until_it_is_set_aside(store):
+    lost = keep(store)
+    kept = keep(store)
+    with store.transaction() as connection:
+        connection.execute("DELETE FROM detail WHERE trial = ?", (lost,))
+    with pytest.raises(DataDamaged, match=rf"#{lost} "):
+        store.columns(("id", "labels"), "TRUE")
+    set_aside(store, [lost], "lost")
+    assert store.columns(("id",), "TRUE")["id"] == (kept,)
+
+
 def test_a_number_that_is_not_there_says_which_are(store):
     with pytest.raises(ConfigError, match=r"trials .*trial 1"):
         store.trial(1)

@@ -13,7 +13,7 @@ import attrs
 import click
 
 from graspsense.cli.options import option_group, pipeline_options, settings_of
-from graspsense.cli.output import echo_json
+from graspsense.cli.output import echo_values, json_option
 from graspsense.cli.terminal import Subcommands, echo, echo_table, talk
 from graspsense.core.components.channels import fingertips
 from graspsense.core.grasp import calibration
@@ -50,7 +50,7 @@ class _Setup(NamedTuple):
 _options = option_group(
     pipeline_options,
     click.option("--replace", is_flag=True, help="Replace the stored calibration without comparing with it."),
-    click.option("--json", "as_json", is_flag=True, help="Print the result as JSON."),
+    json_option(),
 )
 
 
@@ -67,7 +67,7 @@ def calibrate() -> None:
     "--images", type=click.IntRange(2, 1000), default=24, show_default=True, help="Cell images to average."
 )
 @_options
-def tare(images: int, replace: bool, as_json: bool, **asked: Any) -> None:
+def tare(images: int, replace: bool, **asked: Any) -> None:
     """Store the zero of the pads: the mean of cell images with open fingers that touch nothing."""
     with _set_up(asked, replace) as setup:
         stored = stored_zero(setup.stored["tare"]) if "tare" in setup.stored else None
@@ -77,13 +77,13 @@ def tare(images: int, replace: bool, as_json: bool, **asked: Any) -> None:
         if stored is None and not replace:
             setup.backend.tare(taken)
         data = {"left": list(left), "right": list(right), "images": len(taken)}
-        _store(setup, "tare", data, as_json)
+        _store(setup, "tare", data)
 
 
 @calibrate.command()
 @click.argument("readings", type=click.Path(exists=True, dir_okay=False))
 @_options
-def gain(readings: str, replace: bool, as_json: bool, **asked: Any) -> None:
+def gain(readings: str, replace: bool, **asked: Any) -> None:
     """Store the counts under one newton of each cell, computed from READINGS.
 
     READINGS is a CSV file with the columns side (left or right), cell (from 0 on), counts (over the zero of this cell)
@@ -95,13 +95,13 @@ def gain(readings: str, replace: bool, as_json: bool, **asked: Any) -> None:
         gains = {}
         for side, numbers in rows.items():
             gains[side] = counts_per_newton([(_cell(row[0]), row[1], row[2]) for row in numbers], cells)
-        _store(setup, "gain", {side: list(values) for side, values in gains.items()}, as_json)
+        _store(setup, "gain", {side: list(values) for side, values in gains.items()})
 
 
 @calibrate.command("load-cell")
 @click.argument("readings", type=click.Path(exists=True, dir_okay=False))
 @_options
-def load_cell(readings: str, replace: bool, as_json: bool, **asked: Any) -> None:
+def load_cell(readings: str, replace: bool, **asked: Any) -> None:
     """Store a table from what the gripper measures to the force of a load cell, computed from READINGS.
 
     READINGS is a CSV file with the column load_n (force of the load cell). For a gripper with pads, its other columns
@@ -112,13 +112,13 @@ def load_cell(readings: str, replace: bool, as_json: bool, **asked: Any) -> None
     with _set_up(asked, replace) as setup:
         pads = any(channel.name == "pads" for channel in setup.backend.channels)
         data = _tables(readings, _counts_per_n(setup)) if pads else _motor_tables(readings)
-        _store(setup, "load-cell", data, as_json)
+        _store(setup, "load-cell", data)
 
 
 @calibrate.command("delivered-force")
 @click.argument("readings", type=click.Path(exists=True, dir_okay=False))
 @_options
-def delivered_force(readings: str, replace: bool, as_json: bool, **asked: Any) -> None:
+def delivered_force(readings: str, replace: bool, **asked: Any) -> None:
     """Store a table from the force asked for to the force that the gripper delivered, computed from READINGS.
 
     READINGS is a CSV file with the columns asked_n (force sent to the gripper) and delivered_n (force of a load cell
@@ -131,11 +131,10 @@ def delivered_force(readings: str, replace: bool, as_json: bool, **asked: Any) -
             for asked_n, delivered_n in _rows(readings, columns, "asked_n", "delivered_n")
         )
         data = {"asked_n": list(table.pad_n), "delivered_n": list(table.load_n)}
-        _store(setup, "delivered-force", data, as_json)
-        if not as_json:
-            echo_table(
-                ("ASKED, N", "DELIVERED, N"), [(f"{a:.1f}", f"{b:.1f}") for a, b in zip(*table, strict=True)]
-            )
+        _store(setup, "delivered-force", data)
+        echo_table(
+            ("ASKED, N", "DELIVERED, N"), [(f"{a:.1f}", f"{b:.1f}") for a, b in zip(*table, strict=True)]
+        )
 
 
 @calibrate.command()
@@ -145,7 +144,7 @@ def delivered_force(readings: str, replace: bool, as_json: bool, **asked: Any) -
 @click.option("--narrowest", "narrowest_m", type=click.FloatRange(0.002, 0.08), default=0.01, show_default=True,
               help="Smallest gap, in m.")  # fmt: skip
 @_options
-def friction(gaps: int, narrowest_m: float, replace: bool, as_json: bool, **asked: Any) -> None:
+def friction(gaps: int, narrowest_m: float, replace: bool, **asked: Any) -> None:
     """Store the effort at which the fingers begin to move, closing and opening, over the stroke."""
     with _set_up(asked, replace) as setup:
         if setup.info.tare_images:
@@ -160,10 +159,9 @@ def friction(gaps: int, narrowest_m: float, replace: bool, as_json: bool, **aske
             "closing_n": [breakaway.closing_n for breakaway in measured],
             "opening_n": [breakaway.opening_n for breakaway in measured],
         }
-        _store(setup, "friction", data, as_json)
-        if not as_json:
-            rows = [(f"{a * 1e3:.1f}", f"{b:.2f}", f"{c:.2f}") for a, b, c in measured]
-            echo_table(("GAP, mm", "CLOSING, N", "OPENING, N"), rows)
+        _store(setup, "friction", data)
+        rows = [(f"{a * 1e3:.1f}", f"{b:.2f}", f"{c:.2f}") for a, b, c in measured]
+        echo_table(("GAP, mm", "CLOSING, N", "OPENING, N"), rows)
 
 
 @contextmanager
@@ -203,7 +201,7 @@ def _set_up(asked: Mapping[str, Any], replace: bool) -> Iterator[_Setup]:
         backend.close()
 
 
-def _store(setup: _Setup, kind: str, data: Mapping[str, Any], as_json: bool) -> None:
+def _store(setup: _Setup, kind: str, data: Mapping[str, Any]) -> None:
     made = Calibration(
         kind=kind,
         serial=setup.info.serial,
@@ -213,11 +211,9 @@ def _store(setup: _Setup, kind: str, data: Mapping[str, Any], as_json: bool) -> 
     )
     path = calibration_path(setup.folder, setup.info.serial, kind)
     written = write_calibration(path, made)
-    if as_json:
-        echo_json({"file": str(path), "kind": kind, "serial": written.serial, "made": written.made,
-                   "sha256": written.sha256, "data": dict(written.data)})  # fmt: skip
-    else:
-        echo(f"{kind} of {written.serial} kept in {path}", indent=2)
+    echo_values({"file": str(path), "kind": kind, "serial": written.serial, "made": written.made,
+                 "sha256": written.sha256, "data": dict(written.data)})  # fmt: skip
+    echo(f"{kind} of {written.serial} kept in {path}", indent=2)
     for note in setup.info.notes:
         talk(f"note: {note}")
 

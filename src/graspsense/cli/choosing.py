@@ -7,10 +7,9 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-import click
 from attrs import evolve, frozen
 
-from graspsense.cli.options import dashed, sets_key
+from graspsense.cli.options import sets_key
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import is_csv, learner_of, trials_of
 from graspsense.cli.terminal import echo_as_it_is, echo_entries, echo_entry
@@ -63,13 +62,6 @@ def pipeline_beside(model: str) -> str:
     if path.is_file():
         refuse_other_kind(read_toml(path, str(path), "pipeline").values, "pipeline", str(path))
     return str(path)
-
-
-def refuse_with_choice(given: Mapping[str, Any]) -> None:
-    """Raise UsageError if options are given that do not go together with --choose."""
-    for name in ("checkpoints", "calibration_instances", "target_value"):
-        if given.get(name):
-            raise click.UsageError(f"--choose does not go with {dashed(name)}")
 
 
 def chosen(
@@ -235,10 +227,9 @@ def pipeline_text(chosen: Chosen, model: str) -> str:
         **plain(learner.config),
         "model": os.path.realpath(model),
     }
-    rate = chosen.choice.rate.words
     lines = [
         f"# Chosen by graspsense train --choose from {chosen.labelled.source}.".replace("\n", " "),
-        f"# The rate of the whole procedure is {rate}.",
+        f"# The rate of the whole procedure is {chosen.choice.rate.words}.",
         *toml_lines({"extends": "default", **settings}),
     ]
     return "\n".join(lines) + "\n"

@@ -18,7 +18,7 @@ from graspsense.cli.options import (
     pipeline_options,
     settings_of,
 )
-from graspsense.cli.output import echo_json
+from graspsense.cli.output import echo_values, json_option
 from graspsense.cli.terminal import Style, echo_as_it_is, echo_entry, talk
 from graspsense.core.components.registry import installed
 from graspsense.core.files.whole_file import SaveFailed
@@ -59,7 +59,7 @@ _LABEL = 14
 @pipeline_options
 @live_options
 @viewer_options
-@click.option("--json", "as_json", is_flag=True, help="Print a summary as JSON at the end.")
+@json_option("Print a summary as JSON at the end.")
 def collect(
     labels: str,
     each: int,
@@ -67,7 +67,6 @@ def collect(
     operator: str | None,
     values: tuple[str, ...],
     changed: bool,
-    as_json: bool,
     **asked: Any,
 ) -> None:
     """Prompt for the next object, grasp it and store the trial.
@@ -113,18 +112,18 @@ def collect(
             changed=changed,
             sinks=shown.sinks,
         )
-        _run(collection, save, as_json)
+        _run(collection, save)
 
 
-def _run(collection: Collection, save: str, as_json: bool) -> None:
+def _run(collection: Collection, save: str) -> None:
     """Run the collection and print what there is of each label, also if it is interrupted or a trial is not kept."""
     try:
         collection.run()
     except (KeyboardInterrupt, SaveFailed):
         with suppress(OSError):  # the terminal may have gone
-            _print_counts(save, collection, as_json)
+            _print_counts(save, collection)
         raise
-    _print_counts(save, collection, as_json)
+    _print_counts(save, collection)
 
 
 def _show(shown: Live, save: str, word: str, trial: Trial) -> None:
@@ -149,24 +148,21 @@ def _show(shown: Live, save: str, word: str, trial: Trial) -> None:
             echo_entry("  set", prediction.set_in_words, err=True, width=_LABEL)
 
 
-def _print_counts(save: str, collection: Collection, as_json: bool) -> None:
+def _print_counts(save: str, collection: Collection) -> None:
     from graspsense.core.learn.conformal import COVERAGE, units_lacking
 
     counts, each = collection.counts(), collection.wanted.each
     unit, lacking = units_lacking(collection.store.counts())
-    if as_json:
-        done = all(n >= each for n in counts.values())
-        echo_json(
-            {
-                "store": save,
-                "trials": list(collection.collected),
-                "counts": counts,
-                "each": each,
-                "complete": done,
-                "sets": {"coverage": COVERAGE, "unit": unit, "lacking": lacking},
-            }
-        )
-        return
+    echo_values(
+        {
+            "store": save,
+            "trials": list(collection.collected),
+            "counts": counts,
+            "each": each,
+            "complete": all(n >= each for n in counts.values()),
+            "sets": {"coverage": COVERAGE, "unit": unit, "lacking": lacking},
+        }
+    )
     for word, n in counts.items():
         more_than_asked = ", more than asked for" if n > each else ""
         echo_entry(word, f"{n:>4} of {each}{more_than_asked}", Style.GOOD if n >= each else None, width=24)

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from graspsense.cli.output import echo_found, echo_json, file_to_write_as
+from graspsense.cli.options import refuse_typed
+from graspsense.cli.output import echo_found, echo_values, file_to_write, json_option
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import (
     DEFAULT_CLASSIFIER,
@@ -55,16 +56,15 @@ DEFAULT_FEATURES: Final = ("chitta", "columns")
 )
 @click.option("--feature-sets", metavar="NAMES", help="Comma-separated feature sets; not for a CSV. [chitta]")
 @folds_option
-@click.option("--out", metavar="FILE.html", callback=file_to_write_as(".html"), help="Write a page as well.")
+@click.option("--out", metavar="FILE.html", callback=file_to_write(".html"), help="Write a page as well.")
 @source_options
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+@json_option()
 def compare(
     source: str,
     classifiers: str,
     feature_sets: str | None,
     folds: int,
     out: str | None,
-    as_json: bool,
     **given: Any,
 ) -> None:
     """Measure, print, and write the page."""
@@ -72,10 +72,7 @@ def compare(
 
     if feature_sets and is_csv(source):
         raise click.UsageError("--feature-sets is not for a CSV source, which has its features as columns")
-    if given["target_value"]:
-        raise click.UsageError(
-            "compare is for classifiers; --target-value is for train, predict and evaluate"
-        )
+    refuse_typed(["target_value"], "is for train, predict and evaluate: compare is for classifiers")
     names = _names(classifiers, "--classifiers", "classifier")
     learners = {name: learner_of(source, name, given) for name in names}
     with ProgressLine() as progress:
@@ -84,11 +81,9 @@ def compare(
     if out is not None:
         from graspsense.report.ranking_page import ranking_page
 
-        write_html(Path(out), ranking_page(ranking, command_line(("out", "as_json"))))
-    if as_json:
-        page = {} if out is None else {"page": out}
-        echo_json({**to_json(ranking), "verdict": ranking.verdict, **page})
-        return
+        write_html(Path(out), ranking_page(ranking, command_line(("out",))))
+    page = {} if out is None else {"page": out}
+    echo_values({**to_json(ranking), "verdict": ranking.verdict, **page})
     _print(ranking)
     if out is not None:
         echo_entry("page", out)

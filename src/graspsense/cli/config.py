@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from graspsense.cli.options import pipeline_options, settings_of
-from graspsense.cli.output import echo_json
+from graspsense.cli.output import echo_values, json_option
 from graspsense.cli.terminal import Style, Subcommands, echo, echo_as_it_is
 from graspsense.core.components.registry import installed
 from graspsense.core.pipeline.wiring import check
@@ -25,24 +25,22 @@ def config() -> None:
 @config.command()
 @click.argument("name", metavar="[PIPELINE]", required=False)
 @pipeline_options
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
-def show(name: str | None, as_json: bool, **asked: Any) -> None:
+@json_option()
+def show(name: str | None, **asked: Any) -> None:
     """Print every setting with its meaning, unit, range and default, and with the origin of its value.
 
     The origin is a default, a line of a file, or a command-line option. The output is a complete pipeline file.
     """
     settings = _settings(name, asked)
-    if as_json:
-        echo_json(
-            {
-                "pipeline": settings.pipeline,
-                "components": settings.components,
-                "values": settings.values,
-                "origins": settings.origins,
-                "keys": {table: settings.keys(table) for table in settings.values},
-            }
-        )
-        return
+    echo_values(
+        {
+            "pipeline": settings.pipeline,
+            "components": settings.components,
+            "values": settings.values,
+            "origins": settings.origins,
+            "keys": {table: settings.keys(table) for table in settings.values},
+        }
+    )
 
     echo_as_it_is(to_toml(settings, origins=True), end="")
 
@@ -50,8 +48,8 @@ def show(name: str | None, as_json: bool, **asked: Any) -> None:
 @config.command()
 @click.argument("name", metavar="[PIPELINE]", required=False)
 @pipeline_options
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
-def validate(name: str | None, as_json: bool, **asked: Any) -> None:
+@json_option()
+def validate(name: str | None, **asked: Any) -> None:
     """Check that the settings are valid and the components fit together, without opening anything."""
     from graspsense.core.pipeline.anytime import anytime_of
     from graspsense.core.pipeline.pipeline import model_for
@@ -68,14 +66,12 @@ def validate(name: str | None, as_json: bool, **asked: Any) -> None:
         notes.append(f"`collect` works with it, `run` does not yet: {error}")
     else:
         anytime_of(model, settings.features.create(), settings)
-    if as_json:
-        echo_json(
-            {"valid": True, "pipeline": settings.pipeline, "components": settings.components, "notes": notes}
-        )
-    else:
-        echo(f"{settings.pipeline} is valid: {', '.join(settings.components.values())}", Style.GOOD, indent=2)
-        for note in notes:
-            echo(f"note: {note}", Style.CAUTION, indent=2)
+    echo_values(
+        {"valid": True, "pipeline": settings.pipeline, "components": settings.components, "notes": notes}
+    )
+    echo(f"{settings.pipeline} is valid: {', '.join(settings.components.values())}", Style.GOOD, indent=2)
+    for note in notes:
+        echo(f"note: {note}", Style.CAUTION, indent=2)
 
 
 def _settings(name: str | None, asked: Mapping[str, Any]) -> Settings:

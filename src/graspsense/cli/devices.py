@@ -6,7 +6,7 @@ import attrs
 import click
 
 from graspsense.cli.options import Seconds
-from graspsense.cli.output import echo_json
+from graspsense.cli.output import echo_values, json_option
 from graspsense.cli.terminal import echo, echo_table, state_style, talk
 from graspsense.core.components.registry import installed
 
@@ -20,18 +20,17 @@ from graspsense.core.components.registry import installed
     show_default=True,
     help="Time limit for each plugin, in seconds.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
-def devices(timeout_s: float, as_json: bool) -> None:
+@json_option()
+def devices(timeout_s: float) -> None:
     """List connected grippers."""
     probes = installed().probe_devices(timeout_s)
     devices = [(probe.distribution, device) for probe in probes for device in probe.given]
     failed = {probe.distribution: probe.error for probe in probes if probe.error}
     for distribution, error in failed.items():
         talk(f"{distribution} could not look for its devices: {error}")
-    if as_json:
-        listed = [{**attrs.asdict(device), "distribution": distribution} for distribution, device in devices]
-        echo_json({"devices": listed, "looked": [probe.distribution for probe in probes], "failed": failed})
-    elif devices:
+    listed = [{**attrs.asdict(device), "distribution": distribution} for distribution, device in devices]
+    echo_values({"devices": listed, "looked": [probe.distribution for probe in probes], "failed": failed})
+    if devices:
         rows = [
             (
                 device.backend,

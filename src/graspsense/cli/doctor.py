@@ -8,7 +8,7 @@ import attrs
 import click
 
 from graspsense.cli.options import GRIPPER_ALONE, Seconds, pipeline_options, settings_of
-from graspsense.cli.output import echo_json
+from graspsense.cli.output import echo_values, json_option
 from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entry, state_style
 from graspsense.core.components.entries import Finding
 from graspsense.core.components.registry import HookAnswer, Plugins, installed
@@ -16,7 +16,6 @@ from graspsense.core.control.garbage_collection import no_collection
 from graspsense.core.settings.resolved import Settings
 from graspsense.core.values.errors import ExitCode, GraspsenseError
 
-MARKS: Final = {"ok": "ok", "note": "note", "problem": "PROBLEM"}
 _MARK: Final = 11
 """Width of a mark with its margins."""
 
@@ -40,8 +39,8 @@ _MARK: Final = 11
     help="Move the gripper, 5 times or as often as given: time from a command to the first motion, and to the first "
     "force on a block between its fingers.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
-def doctor(timeout_s: float, repetitions: int | None, as_json: bool, **asked: Any) -> None:
+@json_option()
+def doctor(timeout_s: float, repetitions: int | None, **asked: Any) -> None:
     """Check plugins, libraries, permissions and devices; measure rate, loss and latency.
 
     Nothing moves without --latency. With --gripper and -o, it looks for that gripper (-o gripper.vendor_id=...,
@@ -61,12 +60,11 @@ def doctor(timeout_s: float, repetitions: int | None, as_json: bool, **asked: An
     problems = sum(diagnosis.error != "" for diagnosis in diagnoses) + sum(
         finding.state == "problem" for diagnosis in diagnoses for finding in diagnosis.given
     )
-    if as_json:
-        echo_json({"problems": problems, "diagnoses": [_as_json(diagnosis) for diagnosis in diagnoses]})
-    else:
-        for diagnosis in diagnoses:
+    echo_values({"problems": problems, "diagnoses": [_as_json(diagnosis) for diagnosis in diagnoses]})
+    for diagnosis in diagnoses:
+        if diagnosis.given or diagnosis.error:
             _print(diagnosis)
-        echo(f"{problems} problem(s)", Style.BAD) if problems else echo("no problem found", Style.GOOD)
+    echo(f"{problems} problem(s)", Style.BAD) if problems else echo("no problem found", Style.GOOD)
     if problems:
         raise click.exceptions.Exit(ExitCode.CHECK_FAILED)
 
@@ -136,7 +134,8 @@ def _print(diagnosis: HookAnswer[Finding]) -> None:
         echo_entry("  PROBLEM", f"could not look: {diagnosis.error}", Style.BAD, width=_MARK)
     for finding in diagnosis.given:
         style = None if finding.state == "ok" else state_style(finding.state)
-        echo_entry(f"  {MARKS[finding.state]}", f"{finding.subject}: {finding.words}", style, width=_MARK)
+        mark = "PROBLEM" if finding.state == "problem" else finding.state
+        echo_entry(f"  {mark}", f"{finding.subject}: {finding.words}", style, width=_MARK)
         if finding.state != "ok" and finding.advice:
             if "\n" in finding.advice:
                 for line in filter(None, finding.advice.split("\n")):

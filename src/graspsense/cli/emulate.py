@@ -12,7 +12,7 @@ from typing import Any, Final
 import click
 
 from graspsense.cli.options import GRIPPER_ALONE, pipeline_options, settings_of
-from graspsense.cli.output import echo_json
+from graspsense.cli.output import echo_values, json_option
 from graspsense.cli.terminal import talk
 from graspsense.core.components.entries import EmulatorEntry
 from graspsense.core.components.registry import installed
@@ -32,18 +32,8 @@ LOOK_S: Final = 0.5
     help="How the emulated device is reached: uhid, usb, pty or socket.  [default: the first that works]",
 )
 @pipeline_options
-@click.option(
-    "--json",
-    "as_json",
-    is_flag=True,
-    help="Print JSON, one object per line: at the start and for each command.",
-)
-def emulate(
-    name: str,
-    wire: str,
-    as_json: bool,
-    **asked: Any,
-) -> None:
+@json_option("Print JSON, one object per line: at the start and for each command.")
+def emulate(name: str, wire: str, **asked: Any) -> None:
     """Emulate the gripper NAME (for example pr2) as a device of the operating system, until Ctrl-C.
 
     The command reads commands such as unplug and plug from its standard input, one per line; `help` lists them. The
@@ -64,10 +54,10 @@ def emulate(
     try:
         with present_objects_kept():
             device.tell("plug")
-            _tell_state(device, "plug", as_json)
+            _tell_state(device, "plug")
             talk(f"emulated {name} over {device.wire} at {device.rate_hz:g} Hz: no gripper is touched")
             talk("Ctrl-C ends it; other words, each with Enter: help, state, " + ", ".join(device.words))
-            _serve(device, as_json)
+            _serve(device)
     except KeyboardInterrupt:
         pass
     finally:
@@ -78,13 +68,13 @@ def emulate(
         raise click.exceptions.Exit(ExitCode.NOT_FINISHED)
 
 
-def _serve(device: EmulatedDevice, as_json: bool) -> None:
+def _serve(device: EmulatedDevice) -> None:
     """Do what is asked on standard input, until a signal or `quit`; its end is none, as of a service without one."""
     for line in _lines():
         if device.state().get("failed") or line == "quit":
             return
         if line:
-            _do(device, line, as_json)
+            _do(device, line)
 
 
 def _lines() -> Iterator[str]:
@@ -104,22 +94,20 @@ def _lines() -> Iterator[str]:
         yield ""
 
 
-def _do(device: EmulatedDevice, word: str, as_json: bool) -> None:
+def _do(device: EmulatedDevice, word: str) -> None:
     if word == "help":
         for command, what in device.words.items():
             talk(f"  {command:<10}{what}")
     elif word == "state" or word in device.words:
         if word != "state":
             device.tell(word)
-        _tell_state(device, word, as_json)
+        _tell_state(device, word)
     else:
         known = ("help", "quit", "state", *device.words)
         talk(f"no word {word!r}. Known: {', '.join(known)}.{suggestion(word, known)}")
 
 
-def _tell_state(device: EmulatedDevice, word: str, as_json: bool) -> None:
+def _tell_state(device: EmulatedDevice, word: str) -> None:
     state = {"did": word, **device.state()}
-    if as_json:
-        echo_json(state, long=True)
-    else:
+    if not echo_values(state, long=True):
         talk(", ".join(f"{key} {value}" for key, value in state.items() if value != ""))

@@ -10,7 +10,7 @@ import click
 
 from graspsense.cli.events import evaluate_events
 from graspsense.cli.options import Seconds, refuse_typed, target_option
-from graspsense.cli.output import check_outputs, echo_json, file_to_write_as, page_to_write
+from graspsense.cli.output import check_outputs, echo_values, file_to_write, json_option, page_to_write
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import (
     SOURCES,
@@ -53,9 +53,7 @@ if TYPE_CHECKING:
 @source_argument
 @target_option("What is recognised: whole labels, classes, or the states within each class.")
 @folds_option
-@click.option(
-    "--png", metavar="FILE.png", callback=file_to_write_as(".png"), help="Draw the confusion matrix."
-)
+@click.option("--png", metavar="FILE.png", callback=file_to_write(".png"), help="Draw the confusion matrix.")
 @click.option("--report", metavar="DIR", help="Write the page DIR/report.html as well.")
 @keep_option
 @click.option("--overwrite", is_flag=True, help="Replace the file of --keep if it exists.")
@@ -75,7 +73,7 @@ if TYPE_CHECKING:
 )
 @classifier_option
 @source_options
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+@json_option()
 def evaluate(
     source: str,
     target: str,
@@ -86,25 +84,21 @@ def evaluate(
     overwrite: bool,
     checkpoints: str | None,
     classifier: str | None,
-    as_json: bool,
     **given: Any,
 ) -> None:
     """Measure and print."""
     if given["events"]:
-        evaluate_events(source, given["tolerance"], folds, as_json, given)
+        evaluate_events(source, given["tolerance"], folds, given)
         return
     refuse_typed(["tolerance"], "is for --events")
     from graspsense.core.learn.checkpoints import checkpoints_of
 
     check_outputs(keep, overwrite=overwrite, sources=[source])
+    if given["target_value"]:
+        evaluate_value(source, classifier, folds, keep, given)
+        return
     page = None if report is None else page_to_write(report)
     times = checkpoints_of(checkpoints)
-    if given["target_value"]:
-        if page is not None:
-            raise click.UsageError("--report is for labels, and not for --target-value")
-
-        evaluate_value(source, classifier, folds, keep, as_json, given)
-        return
     learner = learner_of(source, classifier, given)
     with ProgressLine() as progress:
         labelled = trials_of(source, progress, given, times, folds)
@@ -115,11 +109,9 @@ def evaluate(
         _draw(evaluation, Path(png))
     if page is not None:
         _write_page(page, evaluation, learner, labelled)
-    if as_json:
-        more = {} if early is None else {"early": to_json(early)}
-        more |= {} if page is None else {"page": str(page)}
-        echo_json({**to_json(evaluation), **more})
-        return
+    more = {} if early is None else {"early": to_json(early)}
+    more |= {} if page is None else {"page": str(page)}
+    echo_values({**to_json(evaluation), **more})
     _print(evaluation)
     if early is not None:
         _print_early(early)
@@ -160,7 +152,7 @@ def _draw(evaluation: Evaluation, path: Path) -> None:
 def _write_page(path: Path, evaluation: Evaluation, learner: SelectedComponent, labelled: Labelled) -> None:
     from graspsense.report.evaluation_page import evaluation_page
 
-    command = command_line(("report", "as_json", "png", "keep", "overwrite"))
+    command = command_line(("report", "png", "keep", "overwrite"))
     write_html(path, evaluation_page(evaluation, learner, labelled, command))
 
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
 from graspsense.cli.options import refuse_typed, typed
-from graspsense.cli.output import echo_json
+from graspsense.cli.output import echo_values
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import detector_of
 from graspsense.cli.terminal import Style, echo, echo_entries, echo_entry, echo_table
@@ -21,16 +21,12 @@ if TYPE_CHECKING:
 _FOR_EVENTS: Final = ("source", "events", "tolerance", "folds", "only", "options", "seed", "force", "as_json")
 
 
-def evaluate_events(
-    source: str, tolerance_s: float, folds: int, as_json: bool, given: Mapping[str, Any]
-) -> None:
+def evaluate_events(source: str, tolerance_s: float, folds: int, given: Mapping[str, Any]) -> None:
     """Score the events, and print how well each kind is told."""
     refuse_typed({*typed()}.difference(_FOR_EVENTS), "has no meaning with --events")
     evaluation = _evaluated(source, tolerance_s, folds, given)
-    if as_json:
-        echo_json(to_json(evaluation))
-    else:
-        _print(evaluation)
+    echo_values(to_json(evaluation))
+    _print(evaluation)
 
 
 def _evaluated(source: str, tolerance_s: float, folds: int, given: Mapping[str, Any]) -> EventsEvaluation:

@@ -12,7 +12,7 @@ import click
 
 from graspsense.cli.live import Live, LiveOptions, live_options, shown_live
 from graspsense.cli.options import force_option, keys_option
-from graspsense.cli.output import echo_found, echo_json, file_to_write_as
+from graspsense.cli.output import echo_found, echo_values, file_to_write, json_option
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.terminal import Style, echo, echo_entry, echo_table, talk
 from graspsense.core.files.whole_file import SaveFailed
@@ -60,7 +60,7 @@ class ExperimentCommand(click.Command):
 @force_option
 @live_options
 @click.option("--dry-run", is_flag=True, help="Print what would be done, and do nothing.")
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+@json_option()
 def experiment(
     experiment: str | None,
     out: str | None,
@@ -72,7 +72,6 @@ def experiment(
     live: bool,
     live_address: str | None,
     dry_run: bool,
-    as_json: bool,
 ) -> None:
     """Run the experiment NAME or FILE.toml: every case with every seed. Write report.html to --out.
 
@@ -84,7 +83,7 @@ def experiment(
     from graspsense.experiments.experiment_file import read_experiment, shipped
 
     if experiment is None:
-        _list(shipped(), as_json)
+        _list(shipped())
         return
     from graspsense.experiments.answer import answer
     from graspsense.experiments.executors.choose import chosen
@@ -98,7 +97,7 @@ def experiment(
     make = chosen(executor, workers)
     refuse_store(results.folder)
     if dry_run:
-        _plan(planned, results, workers or os.cpu_count() or 1, as_json)
+        _plan(planned, results, workers or os.cpu_count() or 1)
         return
     with shown_live(LiveOptions(live, live_address)) as shown:
         account = _run(planned, results, make, resume, shown)
@@ -106,12 +105,10 @@ def experiment(
         page, problem = _written_page(summary, results)
         more = findings_of(summary)
         shown.told("progress", {"text": answer(summary) if more is None else more.answer})
-    if as_json:
-        findings = {} if more is None else {"answer": more.answer, "findings": dict(more.values)}
-        place = None if page is None else str(page)
-        echo_json({**summary.as_json(), **findings, "page": place, **_counts(account, problem)})
-    else:
-        _print(summary, more, account, f"none: {problem}" if problem else str(page))
+    findings: dict[str, Any] = {} if more is None else {"answer": more.answer, "findings": dict(more.values)}
+    findings["page"] = None if page is None else str(page)
+    echo_values({**summary.as_json(), **findings, **_counts(account, problem)})
+    _print(summary, more, account, f"none: {problem}" if problem else str(page))
     if account.stopped == "interrupted":
         raise click.exceptions.Exit(ExitCode.INTERRUPTED)
     if problem or not account.complete:
@@ -162,21 +159,19 @@ def _counts(account: Account, problem: str) -> dict[str, object]:
     }
 
 
-def _list(known: Iterable[str], as_json: bool) -> None:
+def _list(known: Iterable[str]) -> None:
     from graspsense.experiments.duration import ESTIMATED_FROM, effort_of
     from graspsense.experiments.experiment_file import read_experiment
 
     cores = os.cpu_count() or 1
     planned = {name: read_experiment(name) for name in known}
     efforts = {name: effort_of(experiment) for name, experiment in planned.items()}
-    if as_json:
-        echo_json(
-            [
-                {"name": name, "title": experiment.experiment.title, **_effort_as_json(efforts[name])}
-                for name, experiment in planned.items()
-            ]
-        )
-        return
+    echo_values(
+        [
+            {"name": name, "title": experiment.experiment.title, **_effort_as_json(efforts[name])}
+            for name, experiment in planned.items()
+        ]
+    )
     rows = [
         (name, efforts[name].time_on(cores), str(efforts[name].tasks), experiment.experiment.title)
         for name, experiment in planned.items()
@@ -202,14 +197,12 @@ def _effort_as_json(effort: Effort) -> dict[str, object]:
     }
 
 
-def _plan(planned: Planned, results: Results, workers: int, as_json: bool) -> None:
+def _plan(planned: Planned, results: Results, workers: int) -> None:
     """Print what the experiment consists of, what is done already, and how long it takes."""
     from graspsense.experiments.duration import ESTIMATED_FROM, effort_of
 
     effort = effort_of(planned)
-    if as_json:
-        echo_json({"dry_run": True, "experiment": planned.name, **_effort_as_json(effort)})
-        return
+    echo_values({"dry_run": True, "experiment": planned.name, **_effort_as_json(effort)})
     kind = "simulated grasps" if effort.simulated else "trials"
     trials = "not known before the data set is read" if effort.trials is None else f"{effort.trials} {kind}"
     echo(planned.experiment.question or planned.experiment.title, Style.HEADING)
@@ -304,11 +297,11 @@ DEFAULT_PAGE = "comparison.html"
     metavar="FILE.html",
     default=DEFAULT_PAGE,
     show_default=True,
-    callback=file_to_write_as(".html"),
+    callback=file_to_write(".html"),
     help="The page.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print the comparison as JSON.")
-def compare(folders: tuple[str, ...], out: str, as_json: bool) -> None:
+@json_option("Print the comparison as JSON.")
+def compare(folders: tuple[str, ...], out: str) -> None:
     """Compare experiments: their settings, their rates, and the differences from the first one.
 
     A, B, ... are folders that `graspsense experiment` wrote. The differences are paired by seed where both experiments
@@ -319,9 +312,7 @@ def compare(folders: tuple[str, ...], out: str, as_json: bool) -> None:
 
     comparison = compare_experiments(folders)
     write_html(Path(out), comparison_page(comparison))
-    if as_json:
-        echo_json({**comparison.as_json(), "page": out})
-        return
+    echo_values({**comparison.as_json(), "page": out})
     echo(comparison.answer, Style.RESULT)
     echo()
     for line in doubts(comparison):

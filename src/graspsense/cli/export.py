@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from graspsense.cli.output import echo_json
+from graspsense.cli.output import echo_values, json_option
 from graspsense.cli.sources import named_store
 from graspsense.cli.terminal import echo
 from graspsense.core.components.firstparty import provider
@@ -28,8 +28,8 @@ from graspsense.core.values.errors import ConfigError
 @click.option(
     "--pictures", is_flag=True, help="Add the tactile images as pictures for Foxglove (.mcap of one grasp)."
 )
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
-def export(source: str, target: str, pictures: bool, as_json: bool) -> None:
+@json_option()
+def export(source: str, target: str, pictures: bool) -> None:
     """Write the trials of the store DIR as a table (.csv .npz .arff .parquet), or one recorded grasp, tick by tick.
 
     One grasp is a trial of a store, DIR#NUMBER, or a FILE.mcap. Its formats are .csv, .npz, .parquet,
@@ -51,7 +51,7 @@ def export(source: str, target: str, pictures: bool, as_json: bool) -> None:
             raise ConfigError(
                 f"{target!r}: {wrong}. A data set is written from the folder of a store, without --pictures"
             )
-        echo_written(target, write_dataset(kind, place, source), as_json)
+        echo_written(target, write_dataset(kind, place, source))
         return
     writers = export_table.WRITERS if table else export_trace.WRITERS
     if path.suffix not in writers:
@@ -76,17 +76,16 @@ def export(source: str, target: str, pictures: bool, as_json: bool) -> None:
         else:
             export_trace.WRITERS[path.suffix](path, grasp)
         written = {"ticks": len(grasp), "images": grasp.images}
-        if path.suffix == ".toml" and not as_json:
+        if path.suffix == ".toml":
+            echo_values({"file": target, **written})
             echo(f"{target}: the settings of {source}")
             return
-    echo_written(target, written, as_json)
+    echo_written(target, written)
 
 
-def echo_written(target: str, written: Mapping[str, Any], as_json: bool) -> None:
+def echo_written(target: str, written: Mapping[str, Any]) -> None:
     """Print what was written."""
-    if as_json:
-        echo_json({"file": target, **written})
-        return
+    echo_values({"file": target, **written})
     counts = ("trials", "ticks", "images", "frames")
     echo(f"{target}: {', '.join(f'{written[key]} {key}' for key in counts if key in written)}")
     if written.get("set_aside"):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from graspsense.cli.options import keys_option
-from graspsense.cli.output import check_outputs, echo_json
+from graspsense.cli.output import check_outputs, echo_values, json_option
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import keep_features, keep_option, named_store
 from graspsense.cli.terminal import echo, echo_entries, echo_entry, echo_table
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 )
 @keep_option
 @click.option("--overwrite", is_flag=True, help="Replace the file of --keep if it exists.")
-@click.option("--json", "as_json", is_flag=True, help="Print the comparison as JSON.")
-def features(source: str, options: tuple[str, ...], keep: str | None, overwrite: bool, as_json: bool) -> None:
+@json_option("Print the comparison as JSON.")
+def features(source: str, options: tuple[str, ...], keep: str | None, overwrite: bool) -> None:
     """Extract the features of every labelled trial of a store again, and compare them with the stored ones.
 
     Each recording is replayed with the changed settings, as `graspsense replay` does. The store does not change.
@@ -44,18 +44,16 @@ def features(source: str, options: tuple[str, ...], keep: str | None, overwrite:
         )
     keep_features(keep, after)
     rows = _rows(stored, after)
-    if as_json:
-        echo_json(
-            {
-                "source": f"{STORE}{source}",
-                "options": list(options),
-                "trials": len(after),
-                "features": rows,
-                "notes": list(after.notes),
-                "file": keep,
-            }
-        )
-        return
+    echo_values(
+        {
+            "source": f"{STORE}{source}",
+            "options": list(options),
+            "trials": len(after),
+            "features": rows,
+            "notes": list(after.notes),
+            "file": keep,
+        }
+    )
     echo_table(
         ("FEATURE", "UNIT", "TRIALS BEFORE", "NOW", "MEDIAN BEFORE", "NOW"),
         [

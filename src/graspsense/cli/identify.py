@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +9,7 @@ import click
 from attrs import asdict
 
 from graspsense.cli.options import keys_option, pipeline_option
-from graspsense.cli.output import check_outputs, echo_found, echo_json, file_to_write_as
+from graspsense.cli.output import check_outputs, echo_found, echo_values, file_to_write, json_option
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import named_source
 from graspsense.cli.terminal import Style, echo, echo_entry, talk
@@ -29,7 +28,7 @@ from graspsense.report.write import write_html
     "sources", nargs=-1, required=True, metavar="RECORDING|store:DIR|DIR#N...", callback=named_source
 )
 @click.option(
-    "--out", metavar="FILE.toml", callback=file_to_write_as(".toml"), required=True, help="File of the scene."
+    "--out", metavar="FILE.toml", callback=file_to_write(".toml"), required=True, help="File of the scene."
 )
 @click.option(
     "--class",
@@ -44,9 +43,7 @@ from graspsense.report.write import write_html
     multiple=True,
     help="Squeezes of a rigid block, from which the fingertips are identified first. Can be repeated.",
 )
-@click.option(
-    "--page", metavar="FILE.html", callback=file_to_write_as(".html"), help="Write the report page."
-)
+@click.option("--page", metavar="FILE.html", callback=file_to_write(".html"), help="Write the report page.")
 @click.option("--overwrite", is_flag=True, help="Replace the files of --out and --page if they exist.")
 @pipeline_option("Pipeline with the simulated gripper.  [default: default]")
 @click.option("--gripper", metavar="NAME", help="Another simulated gripper. (gripper.type)")
@@ -56,7 +53,7 @@ from graspsense.report.write import write_html
     is_flag=True,
     help="Accept settings outside of their plausible range, and write a scene that the squeezes do not determine.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+@json_option()
 def identify(
     sources: tuple[str, ...],
     out: str,
@@ -68,7 +65,6 @@ def identify(
     gripper: str | None,
     options: tuple[str, ...],
     force: bool,
-    as_json: bool,
 ) -> None:
     """Identify an object from recorded squeezes, and write it as a scene.
 
@@ -98,15 +94,13 @@ def identify(
         write_html(Path(page), identification_page(result, Path(out).name))
     for note in result.notes:
         talk(f"note: {note}")
-    if as_json:
-        echo_json(_as_values(None if refused else out, result))
-    else:
-        _print(result)
-        if not refused:
-            echo_entry("scene", out)
-            echo_entry("use it", f"graspsense run --object {out}")
-        if page:
-            echo_entry("page", page)
+    echo_values(_as_values(None if refused else out, result))
+    _print(result)
+    if not refused:
+        echo_entry("scene", out)
+        echo_entry("use it", f"graspsense run --object {out}")
+    if page:
+        echo_entry("page", page)
     if refused:
         reasons = "".join(f"\n  {reason}" for reason in refused)
         raise ConfigError(f"{out} is not written:{reasons}\n  --force writes it all the same")
@@ -145,16 +139,13 @@ def _print(result: Identification) -> None:
 
 
 def _as_values(out: str | None, result: Identification) -> dict[str, Any]:
-    def values(items: Sequence[Any]) -> list[dict[str, Any]]:
-        return [asdict(item) for item in items]
-
     return {
         "scene": out,
         "label": result.label,
         "seconds": result.seconds,
-        "parameters": values(result.parameters),
-        "candidates": values(result.candidates),
-        "undetermined": values(result.undetermined),
+        "parameters": list(map(asdict, result.parameters)),
+        "candidates": list(map(asdict, result.candidates)),
+        "undetermined": list(map(asdict, result.undetermined)),
         "fits": [{"name": fit.name, "rms_n": fit.rms_n, "peak_n": fit.peak_n} for fit in result.fits],
         "held_out": list(result.held_out),
         "refusals": list(result.refusals),

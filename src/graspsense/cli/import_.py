@@ -13,12 +13,20 @@ import click
 from attrs import asdict, frozen
 
 from graspsense.cli.import_check import echo_channels, show_files, suggest_manifest
-from graspsense.cli.options import keys_option, pipeline_option
-from graspsense.cli.output import echo_json, file_to_write_as
+from graspsense.cli.options import keys_option, pipeline_option, refuse_typed
+from graspsense.cli.output import echo_values, file_to_write, json_option
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.run import draw_grasp
 from graspsense.cli.sources import named_source
-from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entries, echo_entry, echo_table
+from graspsense.cli.terminal import (
+    Style,
+    echo,
+    echo_as_it_is,
+    echo_entries,
+    echo_entry,
+    echo_table,
+    values_alone,
+)
 from graspsense.core.components.registry import installed
 from graspsense.core.files.whole_file import SaveFailed
 from graspsense.core.pipeline.wiring import check_recording
@@ -62,7 +70,7 @@ FEW: Final = 3
 @click.option(
     "--plot",
     metavar="FILE.png",
-    callback=file_to_write_as(".png"),
+    callback=file_to_write(".png"),
     help="--check: the picture.  [default: import-check.png]",
 )
 @click.option("--label", metavar="CLASS:STATE", help="Label of the object: can:full_open#2.")
@@ -81,7 +89,7 @@ FEW: Final = 3
 )
 @pipeline_option("Pipeline that computes the features.  [default: default]")
 @keys_option("Set a key of the pipeline: -o controller.probing_force_n=17.")
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+@json_option()
 def import_(
     sources: tuple[str, ...],
     save: str | None,
@@ -92,7 +100,6 @@ def import_(
     forces: tuple[str, ...],
     pipeline: str,
     options: tuple[str, ...],
-    as_json: bool,
     **named: str | None,
 ) -> None:
     """Import recorded grasps as trials, each with its recording, features and label.
@@ -114,8 +121,8 @@ def import_(
         raise click.UsageError(
             "name a store for the trials: --save DIR. Or look at the recordings first: --check"
         )
-    if plot is not None and not check:
-        raise click.UsageError("--plot is for --check")
+    if not check:
+        refuse_typed(["plot"], "is for --check")
     if label is not None:
         labels_of(label)  # what is not a label is refused as such, before any file is read
     chosen = _Chosen(pipeline, options)
@@ -123,7 +130,7 @@ def import_(
         with chosen.doubted():
             recordings, unreadable = recordings_to_import(sources, given, label)
     except GraspsenseError:
-        if check and not given and show_files(sources, plot or PICTURE, as_json):
+        if check and not given and show_files(sources, plot or PICTURE):
             return
         raise
     if not recordings:
@@ -131,9 +138,9 @@ def import_(
     recordings = chosen.fitting(recordings, unreadable)
     chosen.fit(recordings)
     if save is None or check:
-        _show(recordings, unreadable, chosen, Path(plot or PICTURE), as_json)
+        _show(recordings, unreadable, chosen, Path(plot or PICTURE))
     else:
-        _import(save, recordings, unreadable, chosen, as_json)
+        _import(save, recordings, unreadable, chosen)
     if unreadable:
         _echo_unreadable(unreadable)
         click.get_current_context().exit(DataDamaged.exit_code)
@@ -259,7 +266,6 @@ def _import(
     recordings: Sequence[ImportedRecording],
     unreadable: list[UnreadableRecording],
     chosen: _Chosen,
-    as_json: bool,
 ) -> None:
     """Import the recordings and print what became of each; those that cannot be replayed join `unreadable`."""
     from graspsense.sources.importing.import_outcomes import refuse_useless, tried
@@ -272,21 +278,23 @@ def _import(
     if not stored.kept and not unreadable:
         raise ConfigError(stored.refused[0])
     if not stored.kept:
-        echo(f"no new trial for {save}", err=as_json)
+        echo(f"no new trial for {save}", err=values_alone())
     elif len(recordings) <= FEW:
         for trial, notes in zip(stored.kept, stored.notes, strict=True):
-            echo(f"{trial['source']}: trial {trial['trial']}, {trial['outcome']}", indent=2, err=as_json)
+            echo(
+                f"{trial['source']}: trial {trial['trial']}, {trial['outcome']}", indent=2, err=values_alone()
+            )
             for note in notes:
-                echo(f"  {note}", Style.CAUTION, err=as_json)
+                echo(f"  {note}", Style.CAUTION, err=values_alone())
     else:
         outcomes = Counter(trial["outcome"] for trial in stored.kept)
         words = ", ".join(f"{count} {outcome}" for outcome, count in outcomes.items())
-        echo(f"{counted(len(stored.kept), 'trial')} imported into {save}: {words}", err=as_json)
+        echo(f"{counted(len(stored.kept), 'trial')} imported into {save}: {words}", err=values_alone())
         for note in recordings[0].labelled.recording.notes[1:]:
-            echo(f"  {note}", err=as_json)
+            echo(f"  {note}", err=values_alone())
     if stored.kept:
-        echo(f"  {chosen.words}", err=as_json)
-        _echo_notices(_summary(recordings), ends.notice, err=as_json)
+        echo(f"  {chosen.words}", err=values_alone())
+        _echo_notices(_summary(recordings), ends.notice, err=values_alone())
     if again := [trial for trial in stored.kept if "earlier" in trial]:
         known = f"{again[0]['source']} is that of trial {again[0]['earlier']}"
         echo(
@@ -294,22 +302,20 @@ def _import(
             f"{known}. A grasp that was read anew is stored twice now: set the earlier trials aside "
             f"(graspsense trials aside {save}#{again[0]['earlier']})",
             Style.CAUTION,
-            err=as_json,
+            err=values_alone(),
         )
     if stored.refused:
         refused = counted(len(stored.refused), "recording")
-        echo(f"  {refused} left out: {stored.refused[0]}", Style.CAUTION, err=as_json)
-    if as_json:
-        failed = [recording.line for recording in unreadable]
-        echo_json(
-            {
-                "store": save,
-                "trials": stored.kept,
-                "refused": stored.refused,
-                "unreadable": failed,
-                "thresholds": chosen.words,
-            }
-        )
+        echo(f"  {refused} left out: {stored.refused[0]}", Style.CAUTION, err=values_alone())
+    echo_values(
+        {
+            "store": save,
+            "trials": stored.kept,
+            "refused": stored.refused,
+            "unreadable": [recording.line for recording in unreadable],
+            "thresholds": chosen.words,
+        }
+    )
 
 
 def _store(
@@ -372,7 +378,6 @@ def _show(
     unreadable: Sequence[UnreadableRecording],
     chosen: _Chosen,
     picture: Path,
-    as_json: bool,
 ) -> None:
     """Print what was understood of the recordings, and draw one of them. Raises ConfigError if most are useless."""
     from graspsense.core.pipeline.pipeline import grasp_with
@@ -382,24 +387,21 @@ def _show(
     summary, tries = _summary(recordings), tried(recordings, chosen.settings)
     outcomes = tries.outcomes
     ends = {outcome.words: count for outcome, count in outcomes.most_common()}
-    if as_json:
-        failed = [recording.line for recording in unreadable]
-        echo_json(
-            {
-                **asdict(summary),
-                "unreadable": failed,
-                "thresholds": chosen.words,
-                "outcomes": ends,
-                "rests": tries.notice,
-            }
-        )
-    else:
-        _echo_summary(summary)
-        echo_channels(summary.measured)
-        echo_entry("thresholds", chosen.words.partition(": ")[2])
-        some = "" if outcomes.total() == len(recordings) else f" (of {outcomes.total()} that were tried)"
-        echo_entry("outcomes", ", ".join(f"{count} {words}" for words, count in ends.items()) + some)
-        _echo_notices(summary, tries.notice, err=False)
+    echo_values(
+        {
+            **asdict(summary),
+            "unreadable": [recording.line for recording in unreadable],
+            "thresholds": chosen.words,
+            "outcomes": ends,
+            "rests": tries.notice,
+        }
+    )
+    _echo_summary(summary)
+    echo_channels(summary.measured)
+    echo_entry("thresholds", chosen.words.partition(": ")[2])
+    some = "" if outcomes.total() == len(recordings) else f" (of {outcomes.total()} that were tried)"
+    echo_entry("outcomes", ", ".join(f"{count} {words}" for words, count in ends.items()) + some)
+    _echo_notices(summary, tries.notice, err=False)
     middle = recordings[len(recordings) // 2]
     try:
         with readable(middle.labelled.source), handed_over(middle.name, middle.labelled.recording):

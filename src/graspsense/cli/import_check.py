@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 from attrs import asdict
 
-from graspsense.cli.output import echo_json
+from graspsense.cli.output import echo_values
 from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entries, echo_entry, echo_table, talk
 from graspsense.core.files.whole_file import write_new
 from graspsense.core.values.errors import GraspsenseError, PluginUnavailable
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from graspsense.sources.manifest.understood import UnderstoodFile
 
 
-def show_files(sources: Sequence[str], picture: str, as_json: bool) -> bool:
+def show_files(sources: Sequence[str], picture: str) -> bool:
     """Print what can be told of files for which neither columns nor a manifest are given, and draw the first.
 
     Returns False if the sources are other ones, or cannot be read. Raises ConfigError for the picture.
@@ -35,16 +35,14 @@ def show_files(sources: Sequence[str], picture: str, as_json: bool) -> bool:
         files = [understood_file(Path(os.path.expanduser(source))) for source in sources]
     except GraspsenseError:
         return False
-    if as_json:
-        echo_json(
-            [
-                {**asdict(file, filter=lambda field, _: field.name != "courses"), "path": str(file.path)}
-                for file in files
-            ]
-        )
-    else:
-        for file in files:
-            _echo_file(file)
+    echo_values(
+        [
+            {**asdict(file, filter=lambda field, _: field.name != "courses"), "path": str(file.path)}
+            for file in files
+        ]
+    )
+    for file in files:
+        _echo_file(file)
     _draw(files[0], Path(picture))
     return True
 

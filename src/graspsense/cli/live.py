@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -72,7 +73,7 @@ viewer_options = option_group(
         is_flag=False,
         flag_value=RERUN_VIEWER,
         metavar="[FILE.rrd]",
-        help="Log the grasp to a file of Rerun, or to a Rerun viewer that is running.",
+        help="Log the grasp to a new file of Rerun, or to a Rerun viewer that is running.",
     ),
 )
 """For a command with `live_options` that grasps."""
@@ -164,10 +165,12 @@ def _started(option: str, name: str, *arguments: str) -> LiveFeed:
 
 
 def _rerun_target(target: str) -> str:
-    """Return the file or the address of a viewer. Raises UsageError for what is neither."""
+    """Return the new file or the address of a viewer. Raises UsageError for what is neither."""
     from urllib.parse import urlsplit
 
     if target.endswith(".rrd"):
+        if os.path.exists(target):
+            raise click.UsageError(f"--rerun: {target} already exists: name another file, or move it away")
         return target
     try:
         address = urlsplit(target)

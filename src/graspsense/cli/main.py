@@ -247,7 +247,6 @@ def _plugin_exit(error: SystemExit) -> PluginUnavailable:
 
 def _report(error: BaseException, arguments: Sequence[str]) -> int:
     """Tell of an error, on stderr and with --json on stdout too, and return the exit code."""
-    as_json = "--json" in arguments
     if isinstance(error, GraspsenseError):
         message, code = str(error), error.exit_code
     elif isinstance(error, click.ClickException):
@@ -278,7 +277,7 @@ def _report(error: BaseException, arguments: Sequence[str]) -> int:
             echo_as_it_is(told, err=True)
         else:
             echo(f"{PROGRAM}: {told}", Style.BAD, indent=2, err=True)
-    if as_json:
+    if "--json" in arguments:
         from graspsense.cli.output import echo_json
 
         with suppress(OSError):  # it may be what the error is about

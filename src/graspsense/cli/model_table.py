@@ -81,8 +81,9 @@ def print_not_verified(report: Mapping[str, Any]) -> None:
     if names:
         why = "reasons: --explain-model"
         if not selection.get("within", True):
-            why = f"verified at {selection['expected_force_n']:.3g} N, reached {report['true_peak_force_n']:.3g} N"
-        echo_entry("simulation", f"accuracy not verified for: {', '.join(names)} ({why})")
+            most_n, reached_n = selection["expected_force_n"], report["true_peak_force_n"]
+            why = f"it was verified up to {most_n:.3g} N, and this grasp reached {reached_n:.3g} N"
+        echo_entry("simulation", f"its accuracy is not verified for: {', '.join(names)} ({why})")
 
 
 def print_selection(selection: Mapping[str, Any]) -> None:

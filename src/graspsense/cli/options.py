@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from typing import Any, Final, TypeVar
+from typing import Any, Final
 
 import click
 
-from graspsense.cli.output import file_to_write_as
+from graspsense.cli.output import CommandT, file_to_write
 from graspsense.core.settings.layers import Flag
 from graspsense.core.settings.resolved import Settings, resolve
 from graspsense.report.write import require_matplotlib
-
-CommandT = TypeVar("CommandT", bound=Callable[..., Any])
 
 DEFAULT_PIPELINE: Final = "default"
 SEED: Final = click.IntRange(0, 2**32 - 1)
@@ -86,7 +84,7 @@ pipeline_options = option_group(
 def _picture_to_write(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
     if value is not None:
         require_matplotlib()
-    return file_to_write_as(".png")(ctx, param, value)
+    return file_to_write(".png")(ctx, param, value)
 
 
 plot_option = click.option(
@@ -130,9 +128,9 @@ def refuse_typed(names: Collection[str], why: str) -> None:
 def contradiction(settings: Settings, label: str) -> click.UsageError:
     """Return the error for a label that contradicts the object of a simulated gripper."""
     return click.UsageError(
-        f"the label {label} is not what the gripper holds, which is {settings.held}: a "
-        "simulated gripper grasps what it is told, so label and object must agree. Leave --object out to grasp what "
-        "the label says"
+        f"the label {label} contradicts the object {settings.held}, which this simulated gripper is told to hold. An "
+        "object that it knows has its own name as the label; one from a file has any other name, as in my-cup#1. Or "
+        "leave out --object to grasp what the label says"
     )
 
 

@@ -7,19 +7,44 @@ import os
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import click
 
-from graspsense.cli.terminal import StyleOf, echo_as_it_is, echo_table, writes_unicode
+from graspsense.cli.terminal import (
+    StyleOf,
+    echo_table,
+    echo_text_of_values,
+    print_values_alone,
+    values_alone,
+    writes_unicode,
+)
 from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.json_values import json_ready
 
 if TYPE_CHECKING:
     from graspsense.report.found_table import FoundTable
 
+CommandT = TypeVar("CommandT", bound=Callable[..., Any])
+
 _PROBE_BYTES: Final = 1 << 16
 """Size of the file by which is tested whether a folder can be written; more than the smallest model."""
+
+
+def json_option(text: str = "Print the result as JSON.") -> Callable[[CommandT], CommandT]:
+    """Return the decorator that adds --json; `text` says what is printed by it, with `echo_values`."""
+
+    def ask(_context: click.Context, _param: click.Parameter, asked: bool) -> None:
+        print_values_alone(asked)
+
+    return click.option("--json", "as_json", is_flag=True, expose_value=False, callback=ask, help=text)
+
+
+def echo_values(value: object, long: bool = False) -> bool:
+    """Print the result of a command as JSON if --json was given, and return whether; its text is then not printed."""
+    if values_alone():
+        echo_json(value, long)
+    return values_alone()
 
 
 def echo_json(value: object, long: bool = False) -> None:
@@ -27,14 +52,13 @@ def echo_json(value: object, long: bool = False) -> None:
 
     A long one comes in one line, which takes a fifth of the time.
     """
-    echo_as_it_is(
-        json.dumps(
-            json_ready(value),
-            indent=None if long else 2,
-            ensure_ascii=not writes_unicode(),
-            allow_nan=False,
-        )
+    text = json.dumps(
+        json_ready(value),
+        indent=None if long else 2,
+        ensure_ascii=not writes_unicode(),
+        allow_nan=False,
     )
+    echo_text_of_values(text)
 
 
 def echo_found(table: FoundTable, styles: Mapping[str, StyleOf] | None = None) -> None:
@@ -47,42 +71,42 @@ def echo_found(table: FoundTable, styles: Mapping[str, StyleOf] | None = None) -
     echo_table(header, table.rows, styles)
 
 
-def file_to_write(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
-    """Callback of an option that names a file: refuse a file that cannot be written, before the work and not after.
+def file_to_write(
+    ending: str = "",
+) -> Callable[[click.Context, click.Parameter, str | None], str | None]:
+    """Return the callback of an option that names a file, of one format if it has to have an ending such as `.html`.
 
-    A pipe or a device is refused as well: the file that is written takes its place, also where root could replace it.
+    A file that cannot be written is refused before the work and not after. So is a pipe or a device: the file that is
+    written takes its place, also where root could replace it.
     """
-    if value is None:
-        return None
-    path = Path(value)
-    if path.is_dir():
-        raise click.BadParameter(f"{value} is a folder: name a file in it", ctx, param)
-    if path.exists() and not path.is_file():
-        raise click.BadParameter(f"{value} is a pipe or a device: name a file", ctx, param)
-    if not path.parent.is_dir():
-        raise click.BadParameter(f"{value} cannot be written: there is no folder {path.parent}", ctx, param)
-    try:
-        _probe(path.parent)
-    except OSError as error:
-        raise click.BadParameter(f"{value} cannot be written: {error.strerror}", ctx, param) from error
-    return value
+
+    def checked(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
+        if value is None:
+            return None
+        path = Path(value)
+        if ending and path.suffix.lower() != ending:
+            raise click.BadParameter(f"{value}: the name of the file must end in {ending}", ctx, param)
+        if path.is_dir():
+            raise click.BadParameter(f"{value} is a folder: name a file in it", ctx, param)
+        if path.exists() and not path.is_file():
+            raise click.BadParameter(f"{value} is a pipe or a device: name a file", ctx, param)
+        if not path.parent.is_dir():
+            raise click.BadParameter(
+                f"{value} cannot be written: there is no folder {path.parent}", ctx, param
+            )
+        try:
+            _probe(path.parent)
+        except OSError as error:
+            raise click.BadParameter(f"{value} cannot be written: {error.strerror}", ctx, param) from error
+        return value
+
+    return checked
 
 
 def _probe(folder: Path) -> None:
     """Raise OSError if no file can be written in this folder."""
     with tempfile.TemporaryFile(dir=folder) as probe:
         probe.write(bytes(_PROBE_BYTES))
-
-
-def file_to_write_as(ending: str) -> Callable[[click.Context, click.Parameter, str | None], str | None]:
-    """Return the callback of an option that names a file of one format, given by its ending such as `.html`."""
-
-    def checked(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
-        if value is not None and Path(value).suffix.lower() != ending:
-            raise click.BadParameter(f"{value}: the name of the file must end in {ending}", ctx, param)
-        return file_to_write(ctx, param, value)
-
-    return checked
 
 
 def page_to_write(folder: str) -> Path:

@@ -10,7 +10,7 @@ from typing import Any
 import attrs
 import click
 
-from graspsense.cli.output import echo_json
+from graspsense.cli.output import echo_values, json_option
 from graspsense.cli.terminal import Style, Subcommands, echo, echo_entry, echo_table, state_style
 from graspsense.core.components.entries import TABLE_OF_ROLE
 from graspsense.core.components.firstparty import DISTRIBUTION, SHIPPED
@@ -34,14 +34,12 @@ def plugins() -> None:
 
 
 @plugins.command("list")
-@click.option("--json", "as_json", is_flag=True, help="Print JSON: a list with one object per component.")
-def list_plugins(as_json: bool) -> None:
+@json_option("Print JSON: a list with one object per component.")
+def list_plugins() -> None:
     """List all components and plugins, and report broken, outdated, slow and duplicate ones."""
     loaded = installed()
     rows = _rows(loaded)
-    if as_json:
-        echo_json(rows)
-        return
+    echo_values(rows)
     columns = ("role", "name", "distribution", "version", "state")
     echo_table(
         [*(key.upper() for key in columns), "WHAT"],
@@ -63,8 +61,8 @@ def list_plugins(as_json: bool) -> None:
 
 @plugins.command()
 @click.argument("name")
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
-def show(name: str, as_json: bool) -> None:
+@json_option()
+def show(name: str) -> None:
     """Show a distribution or a component (NAME or DISTRIBUTION/NAME): hooks, keys, and why it fails."""
     loaded = installed()
     statuses = [status for status in loaded.statuses if status.distribution == canonical(name)]
@@ -75,14 +73,12 @@ def show(name: str, as_json: bool) -> None:
     ]
     if not statuses and not components:
         raise loaded.unknown(name)
-    if as_json:
-        echo_json(
-            {
-                "plugins": [attrs.asdict(status) for status in statuses],
-                "components": [_described(component) for component in components],
-            }
-        )
-        return
+    echo_values(
+        {
+            "plugins": [attrs.asdict(status) for status in statuses],
+            "components": [_described(component) for component in components],
+        }
+    )
     texts = [_status_text(status) for status in statuses] + [
         _component_text(component) for component in components
     ]
@@ -113,7 +109,7 @@ def show(name: str, as_json: bool) -> None:
     multiple=True,
     help="Folder with sound examples for a reader of recordings.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print JSON: counts and every result.")
+@json_option("Print JSON: counts and every result.")
 @click.pass_context
 def check(
     ctx: click.Context,
@@ -123,7 +119,6 @@ def check(
     absent: Sequence[str],
     wheel: bool,
     data: Sequence[str],
-    as_json: bool,
 ) -> None:
     """Check a component (NAME or DISTRIBUTION/NAME), or a distribution with all its components.
 
@@ -147,22 +142,20 @@ def check(
         echo_entry(result.state, line, style, width=9, err=True)
 
     report = examined.report(told)
-    if as_json:
-        echo_json(
-            {
-                "conforms": not report.failures,
-                "failures": report.failures,
-                "results": [attrs.asdict(result) for result in report.results],
-            }
-        )
-    else:
-        echo(report.counts(), indent=2)
-        echo("does not conform:", Style.BAD) if report.failures else echo("conforms", Style.GOOD)
-        for failure in report.failures:
-            echo(f"  {failure}", indent=2)
-        for result in report.results:
-            if result.untried:
-                echo_entry("not tried", f"{result.check}: {result.text}")
+    echo_values(
+        {
+            "conforms": not report.failures,
+            "failures": report.failures,
+            "results": [attrs.asdict(result) for result in report.results],
+        }
+    )
+    echo(report.counts(), indent=2)
+    echo("does not conform:", Style.BAD) if report.failures else echo("conforms", Style.GOOD)
+    for failure in report.failures:
+        echo(f"  {failure}", indent=2)
+    for result in report.results:
+        if result.untried:
+            echo_entry("not tried", f"{result.check}: {result.text}")
     ctx.exit(ExitCode.CHECK_FAILED if report.failures else 0)
 
 

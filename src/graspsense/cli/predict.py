@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from graspsense.cli.output import echo_json
+from graspsense.cli.output import echo_values, json_option
 from graspsense.cli.sources import SOURCES, source_argument, source_options, to_predict
 from graspsense.cli.target_value import predict_value
 from graspsense.cli.terminal import (
@@ -24,7 +24,7 @@ from graspsense.core.components.entries import ModelEntry
 from graspsense.core.components.registry import installed
 from graspsense.core.values.errors import ConfigError, listed
 from graspsense.core.values.features import UNKNOWN, FeatureTable, Prediction, assumed_units
-from graspsense.core.values.label_text import alike_words, spelled_alike
+from graspsense.core.values.label_text import alike_words, natural_order, spelled_alike
 from graspsense.evaluation.intervals import RecognitionRate, rate_of
 from graspsense.evaluation.json_codec import to_json
 
@@ -48,8 +48,8 @@ MOST_WITH_REASONS: Final = 1000
 @click.argument("model")
 @source_argument
 @source_options
-@click.option("--json", "as_json", is_flag=True, help="Print every prediction with its reasons as JSON.")
-def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
+@json_option("Print every prediction with its reasons as JSON.")
+def predict(model: str, source: str, **given: Any) -> None:
     """Predict and print."""
     from graspsense.core.learn.copies import learned_from
     from graspsense.core.learn.model_file import load_model
@@ -57,7 +57,7 @@ def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
 
     _refuse_swapped(model, source)
     if is_regression(model):
-        return predict_value(model, source, as_json, given)
+        return predict_value(model, source, given)
     asked = load_model(model, installed())
     if given["target_value"]:
         raise click.UsageError(f"--target-value: model {model} predicts a label, not a number")
@@ -68,7 +68,8 @@ def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
     strange = set() if labelled is None else {*labelled.labels} - {*asked.classifier.classes()}
     if strange:
         alike = alike_words(spelled_alike([*strange, *asked.classifier.classes()]))
-        told = f"labels that the model does not know, so that no answer to them is right: {listed(sorted(strange))}"
+        names = listed(natural_order(strange))
+        told = f"labels that the model does not know, so that no answer to them is right: {names}"
         notes = (*notes, told + (f" (differing in spelling only: {alike})" if alike else ""))
     if len(table) > MOST_WITH_REASONS:
         notes = (*notes, f"more than {MOST_WITH_REASONS} trials: the predictions have no reasons")
@@ -78,22 +79,21 @@ def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
     warnings = list(dict.fromkeys(warning for prediction in predictions for warning in prediction.warnings))
     if learned:
         warnings.append(f"{learned}: their predictions say nothing of other trials")
-    if as_json:
-        echo_json(
-            {
-                "model": asked.in_a_line,
-                "n": len(predictions),
-                "predictions": [
-                    {**prediction.as_json(), **({} if labels is None else {"truth": labels[i]})}
-                    for i, prediction in enumerate(predictions)
-                ],
-                "rate": None if rate is None else to_json(rate),
-                "unknown": sum(prediction.label == UNKNOWN for prediction in predictions),
-                "warnings": warnings,
-                "notes": list(notes),
-            },
-            long=len(predictions) > MOST_WITH_REASONS,
-        )
+    if echo_values(
+        {
+            "model": asked.in_a_line,
+            "n": len(predictions),
+            "predictions": [
+                {**prediction.as_json(), **({} if labels is None else {"truth": labels[i]})}
+                for i, prediction in enumerate(predictions)
+            ],
+            "rate": None if rate is None else to_json(rate),
+            "unknown": sum(prediction.label == UNKNOWN for prediction in predictions),
+            "warnings": warnings,
+            "notes": list(notes),
+        },
+        long=len(predictions) > MOST_WITH_REASONS,
+    ):
         return
     _print(predictions, labels)
     echo()

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from graspsense.cli.output import echo_json
+from graspsense.cli.output import echo_values, json_option
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import named_store
 from graspsense.cli.terminal import Style, echo, echo_entries, talk
@@ -17,8 +17,8 @@ from graspsense.store.opening import RECORDINGS
 @click.command()
 @click.argument("source", metavar="DIR|FILE", callback=named_store)
 @click.option("--out", metavar="FILE", help="With a FILE: file for the recovered recording.")
-@click.option("--json", "as_json", is_flag=True, help="Print the result for each file as JSON.")
-def recover(source: str, out: str | None, as_json: bool) -> None:
+@json_option("Print the result for each file as JSON.")
+def recover(source: str, out: str | None) -> None:
     """Complete the interrupted recordings of the store DIR, or write the readable part of a FILE to a new file.
 
     Nothing is deleted: the original of an interrupted recording stays as .cut. Exit code 5 means that some data could
@@ -42,26 +42,24 @@ def recover(source: str, out: str | None, as_json: bool) -> None:
             )
     else:
         recovered = [recover_file(source, out)]
-    if as_json:
-        echo_json({"files": [trial.as_json() for trial in recovered]})
-    else:
-        for trial in recovered:
-            where = f" as trial {trial.trial}" if trial.trial is not None else f" in {trial.recording}"
-            why = f": {trial.why}" if trial.why else ""
-            echo(
-                f"{trial.file.name}: {trial.what}{where if trial.recording else ''}, {trial.ticks} ticks{why}",
-                indent=2,
-            )
-        if not recovered:
-            echo("nothing to recover")
+    echo_values({"files": [trial.as_json() for trial in recovered]})
+    for trial in recovered:
+        where = f" as trial {trial.trial}" if trial.trial is not None else f" in {trial.recording}"
+        why = f": {trial.why}" if trial.why else ""
+        echo(
+            f"{trial.file.name}: {trial.what}{where if trial.recording else ''}, {trial.ticks} ticks{why}",
+            indent=2,
+        )
+    if not recovered:
+        echo("nothing to recover")
     if any(trial.what == "failed" for trial in recovered):
         raise click.exceptions.Exit(ExitCode.DAMAGED)
 
 
 @click.command()
 @click.argument("source", metavar="DIR|FILE", callback=named_store)
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
-def verify(source: str, as_json: bool) -> None:
+@json_option()
+def verify(source: str) -> None:
     """Check the store DIR with all its recordings, or one recording FILE.
 
     Exit code 5 means damage, and 2 that the disk could not be read.
@@ -73,24 +71,22 @@ def verify(source: str, as_json: bool) -> None:
             verified = verify_store(source, lambda done, total: progress("checking", done, total))
     else:
         verified = verify_file(source)
-    if as_json:
-        echo_json(verified.as_json())
-    else:
-        echo_entries("damaged", map(str, verified.problems), Style.BAD)
-        echo_entries("not read", map(str, verified.unread), Style.CAUTION)
-        echo_entries("unfinished", map(str, verified.unfinished), Style.CAUTION)
-        counts = (
-            f"{counted(verified.trials, 'trial')}, {counted(verified.recordings, 'recording')}, "
-            f"{len(verified.problems)} damaged"
+    echo_values(verified.as_json())
+    echo_entries("damaged", map(str, verified.problems), Style.BAD)
+    echo_entries("not read", map(str, verified.unread), Style.CAUTION)
+    echo_entries("unfinished", map(str, verified.unfinished), Style.CAUTION)
+    counts = (
+        f"{counted(verified.trials, 'trial')}, {counted(verified.recordings, 'recording')}, "
+        f"{len(verified.problems)} damaged"
+    )
+    counts += f", {len(verified.unread)} not read" if verified.unread else ""
+    echo(counts, Style.BAD if verified.problems else Style.CAUTION if verified.unread else Style.GOOD)
+    if verified.unread:
+        echo(
+            "nothing is known of what could not be read, which may be whole: check its permissions and the disk"
         )
-        counts += f", {len(verified.unread)} not read" if verified.unread else ""
-        echo(counts, Style.BAD if verified.problems else Style.CAUTION if verified.unread else Style.GOOD)
-        if verified.unread:
-            echo(
-                "nothing is known of what could not be read, which may be whole: check its permissions and the disk"
-            )
-        if verified.unfinished:
-            echo("graspsense recover saves what is unfinished")
+    if verified.unfinished:
+        echo("graspsense recover saves what is unfinished")
     if verified.problems:
         raise click.exceptions.Exit(ExitCode.DAMAGED)
     if verified.unread:

@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from graspsense.cli.options import force_option, keys_option, pipeline_option, plot_option
-from graspsense.cli.output import echo_json
+from graspsense.cli.output import echo_values, json_option
 from graspsense.cli.run import draw_grasp, print_trial
 from graspsense.core.components.registry import installed
 from graspsense.core.pipeline.wiring import check
@@ -24,14 +24,13 @@ from graspsense.core.values.trial import trial_as_json
 @keys_option("Set a key of the pipeline: -o features.pads=left.")
 @force_option
 @plot_option
-@click.option("--json", "as_json", is_flag=True, help="Print the trial as JSON.")
+@json_option("Print the trial as JSON.")
 def replay(
     recording: str,
     pipeline: str | None,
     options: tuple[str, ...],
     force: bool,
     plot: str | None,
-    as_json: bool,
 ) -> None:
     """Compute features and a prediction from a recording, as during the grasp; nothing moves.
 
@@ -43,10 +42,8 @@ def replay(
     settings = _settings(recording, pipeline, options, force)
     check(settings)
     trial = grasp_with(settings, installed())
-    if as_json:
-        echo_json(trial_as_json(trial))
-    else:
-        print_trial(trial)
+    echo_values(trial_as_json(trial))
+    print_trial(trial)
     if plot is not None:
         draw_grasp(trial, Path(plot))
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from graspsense.cli.options import SEED, target_option
-from graspsense.cli.output import echo_json
+from graspsense.cli.output import echo_values, json_option
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import folds_option, named_store
 from graspsense.cli.terminal import Style, echo, echo_as_it_is, warn
@@ -33,7 +33,7 @@ from graspsense.report.write import write_html
     multiple=True,
     help="Store: a number to predict, which gets a section. Can be repeated.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print the path of the page as JSON.")
+@json_option("Print the path of the page as JSON.")
 def report(
     folder: str,
     out: str | None,
@@ -43,7 +43,6 @@ def report(
     seed: int,
     grasp: int | None,
     values: tuple[str, ...],
-    as_json: bool,
 ) -> None:
     """Write report.html for the store or the experiment in DIR.
 
@@ -79,8 +78,6 @@ def report(
             )
         page = with_numbers(page, numbers)
     write_html(path, page)
-    if as_json:
-        echo_json({"page": str(path), "answer": page.answer})
-    else:
-        echo(page.answer, Style.HEADING)
-        echo_as_it_is(f"page        {path}")
+    echo_values({"page": str(path), "answer": page.answer})
+    echo(page.answer, Style.HEADING)
+    echo_as_it_is(f"page        {path}")

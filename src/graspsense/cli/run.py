@@ -13,7 +13,7 @@ from graspsense.cli.live import LiveOptions, live_options, shown_live, viewer_op
 from graspsense.cli.live_rows import LiveRows
 from graspsense.cli.model_table import print_model, print_not_verified, print_selection, print_without
 from graspsense.cli.options import contradiction, names_object, pipeline_options, plot_option, settings_of
-from graspsense.cli.output import echo_json
+from graspsense.cli.output import echo_values, json_option
 from graspsense.cli.terminal import (
     LABEL_WIDTH,
     Style,
@@ -24,6 +24,7 @@ from graspsense.cli.terminal import (
     prediction_style,
     state_style,
     talk,
+    values_alone,
     warn,
 )
 from graspsense.core.components.entries import PipelineEntry
@@ -91,7 +92,7 @@ MANY_GUARDED: Final = 0.1
 @live_options
 @viewer_options
 @click.option("--dry-run", is_flag=True, help="Print what would be done, and open nothing.")
-@click.option("--json", "as_json", is_flag=True, help="Print the trial as JSON.")
+@json_option("Print the trial as JSON.")
 def run(
     save: str | None,
     label: str | None,
@@ -103,7 +104,6 @@ def run(
     video: str | None,
     viewer: bool,
     dry_run: bool,
-    as_json: bool,
     **asked: Any,
 ) -> None:
     """Open, tare, close, squeeze and release; print the outcome, the features and the prediction.
@@ -122,16 +122,16 @@ def run(
     settings, drawn = _settings_to_run(save, label, asked)
     check(settings)
     if dry_run:
-        _say_what_would_be_done(settings, as_json)
+        _say_what_would_be_done(settings)
         return
     if (label is not None or changed) and save is None:
         given = "--changed" if label is None else "--label"
         raise click.UsageError(f"{given} goes with a trial that is kept: add --save DIR")
     if beside is not None:
-        _run_beside(settings, beside, save, label, as_json)
+        _run_beside(settings, beside, save, label)
         return
     film = _film(picture, video, viewer)
-    sinks: tuple[Sink, ...] = film if as_json else (LiveRows(), *film)
+    sinks: tuple[Sink, ...] = film if values_alone() else (LiveRows(), *film)
     with shown_live(live, save) as shown:
         sinks = (*sinks, *shown.sinks)
         if save is None:
@@ -141,21 +141,17 @@ def run(
         if drawn is not None:
             talk(f"seed {drawn}, drawn for this trial; --seed {drawn} repeats the grasp")
         shown.finished(trial, save)
-        if as_json:
-            echo_json(_as_json(trial, kept))
-        else:
-            print_trial(trial)
-            _print_better(settings, trial)
-            _print_model(trial)
+        echo_values(_as_json(trial, kept))
+        print_trial(trial)
+        _print_better(settings, trial)
+        _print_model(trial)
         if plot is not None:
             draw_grasp(trial, Path(plot))
         _write_film(film, save, kept)
     finish(trial, interrupted, "" if kept is None else kept["problem"])
 
 
-def _run_beside(
-    settings: Settings, pipeline: str, save: str | None, label: str | None, as_json: bool
-) -> None:
+def _run_beside(settings: Settings, pipeline: str, save: str | None, label: str | None) -> None:
     """Grasp with the grippers of these settings and of another pipeline at once, and print both trials.
 
     Ends the command with the exit code of the first trial that was not kept or did not end by itself.
@@ -178,9 +174,8 @@ def _run_beside(
         return ended, f"ended as {trial.outcome.words} ({trial.reason})" if failed else ""
 
     both = run_pair(lambda member: grasp(member, settings, 0), lambda member: grasp(member, other, 1))
-    if as_json:
-        echo_json({"grippers": [_as_json(trial, kept) for trial, _, kept in both]})
-    for trial, _, kept in () if as_json else both:
+    echo_values({"grippers": [_as_json(trial, kept) for trial, _, kept in both]})
+    for trial, _, kept in both:
         echo()
         echo_entry("gripper", trial.device.name)
         print_trial(trial)
@@ -414,7 +409,7 @@ def effort_words(kinds: Sequence[str], least_n: float, most_n: float) -> str:
     return f"{least_n:+.1f} to {most_n:+.1f} N{limits}"
 
 
-def _say_what_would_be_done(settings: Settings, as_json: bool) -> None:
+def _say_what_would_be_done(settings: Settings) -> None:
     from graspsense.core.grasp.dry_run import dry_run
 
     why_not = "nothing emulates this gripper"
@@ -422,17 +417,15 @@ def _say_what_would_be_done(settings: Settings, as_json: bool) -> None:
         rehearsed = dry_run(settings.gripper.create(), settings.controller.create(), settings.run)
     except GraspsenseError as error:
         rehearsed, why_not = None, str(error)
-    if as_json:
-        plan: dict[str, Any] = {
+    echo_values(
+        {
             "dry_run": True,
             "components": dict(settings.components),
             "settings": settings.values,
             "rehearsed_on": rehearsed.device if rehearsed else None,
             "commands": [phase._asdict() for phase in rehearsed.phases] if rehearsed else None,
         }
-        echo_json(plan)
-        return
-
+    )
     echo("would open, tare, close, hold and release with:")
     for table, component in settings.components.items():
         echo(f"  {table:<11}{component}")

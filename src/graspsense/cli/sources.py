@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -129,7 +129,7 @@ folds_option = click.option(
 keep_option = click.option(
     "--keep",
     metavar="FILE",
-    callback=file_to_write,
+    callback=file_to_write(),
     help="Write the features of all trials as a CSV file.",
 )
 """The file that `keep_features` writes."""
@@ -260,13 +260,13 @@ def detector_of(source: str, given: Mapping[str, Any]) -> SelectedComponent:
     return _alone("controller", "event-detector", given, source)
 
 
-def command_line(without: Sequence[str], command: str = "") -> str:
+def command_line(without: Collection[str], command: str = "") -> str:
     """Return the command that is running, or another one with its arguments, without some options, as printable."""
     context = click.get_current_context()
     words = ["graspsense", command or str(context.info_name)]
     by_user = set(typed()).difference(without)
     for param in context.command.params:
-        if param.name not in by_user:
+        if param.name not in by_user or not param.expose_value:
             continue
         value = context.params[param.name]
         if isinstance(param, click.Argument):

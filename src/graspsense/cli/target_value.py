@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -10,7 +11,7 @@ import click
 from attrs import evolve
 
 from graspsense.cli.options import refuse_typed
-from graspsense.cli.output import echo_found, echo_json
+from graspsense.cli.output import echo_found, echo_values
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import command_line, keep_features, to_predict, trials_of
 from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entries, echo_entry, echo_table, talk
@@ -24,7 +25,7 @@ from graspsense.regression.results import RegressionEvaluation, error_of
 if TYPE_CHECKING:
     from graspsense.regression.model import PredictedValue, RegressionModel
 
-_FOR_LABELS: Final = ("png", "target", "checkpoints")
+_FOR_LABELS: Final = ("png", "report", "target", "checkpoints")
 
 
 def _estimator(named: str | None, options: Sequence[str]) -> str:
@@ -48,7 +49,7 @@ def _estimator(named: str | None, options: Sequence[str]) -> str:
 
 
 def evaluate_value(
-    source: str, estimator: str | None, folds: int, keep: str | None, as_json: bool, given: Mapping[str, Any]
+    source: str, estimator: str | None, folds: int, keep: str | None, given: Mapping[str, Any]
 ) -> None:
     """Cross-validate the prediction of a number, and print it."""
     from graspsense.regression.evaluate import evaluate_regression
@@ -58,14 +59,12 @@ def evaluate_value(
         labelled = trials_of(source, progress, given)
         keep_features(keep, labelled)
         evaluation = evaluate_regression(chosen, labelled, folds=folds, seed=given["seed"], progress=progress)
-    if as_json:
-        echo_json(to_json(evaluation))
-    else:
-        _print_evaluation(evaluation)
+    echo_values(to_json(evaluation))
+    _print_evaluation(evaluation)
 
 
 def train_value(
-    source: str, estimator: str | None, out: str, keep: str | None, as_json: bool, given: Mapping[str, Any]
+    source: str, estimator: str | None, out: str, keep: str | None, given: Mapping[str, Any]
 ) -> None:
     """Train a model of a number, write it, and print what it was trained on."""
     from graspsense.core.learn.conformal import COVERAGE
@@ -81,17 +80,15 @@ def train_value(
             labelled,
             name=Path(out).stem,
             seed=given["seed"],
-            provenance={"command": command_line(("keep", "overwrite", "as_json"))},
+            provenance={"command": command_line(("keep", "overwrite"))},
         )
     write_regression(Path(out), model)
     keep_features(keep, labelled)
     for note in notes:
         talk(f"note: {note}")
-    if as_json:
-        content = model.as_json()
-        kept = ("estimator", "target_value", "features", "provenance", "interval")
-        echo_json({"model": out, **{key: content[key] for key in kept}, "trials": len(labelled)})
-        return
+    content = model.as_json()
+    kept = ("estimator", "target_value", "features", "provenance", "interval")
+    echo_values({"model": out, **{key: content[key] for key in kept}, "trials": len(labelled)})
     echo(f"{out}: {model.in_a_line}", indent=2)
     unit = model.target.unit
     widths = model.intervals.half_widths
@@ -104,10 +101,11 @@ def train_value(
         + ("" if most == least else f" to {most}, by its size"),
     )
     # In one line, so that it can be copied.
-    echo_as_it_is(f"how good    {command_line(('out', 'keep', 'overwrite', 'as_json'), 'evaluate')}")
+    echo_as_it_is(f"how good    {command_line(('out', 'keep', 'overwrite'), 'evaluate')}")
+    echo_as_it_is(f"use it      graspsense predict {shlex.quote(out)} OTHER")
 
 
-def predict_value(model_name: str, source: str, as_json: bool, given: Mapping[str, Any]) -> None:
+def predict_value(model_name: str, source: str, given: Mapping[str, Any]) -> None:
     """Predict a number for each trial, and compare it with the true one if --target-value names it."""
     from graspsense.core.learn.copies import learned_from, row_hashes
     from graspsense.regression.model import load_regression
@@ -133,29 +131,27 @@ def predict_value(model_name: str, source: str, as_json: bool, given: Mapping[st
         error = error_of(errors, labelled.instances)
         if learned:
             error = evolve(error, interval=None, no_interval=learned)
-    if as_json:
-        echo_json(
-            {
-                "model": model.in_a_line,
-                "target_value": model.target.name,
-                "unit": model.target.unit,
-                "n": len(predictions),
-                "predictions": [
-                    {
-                        "value": prediction.value,
-                        "interval": None if prediction.low is None else [prediction.low, prediction.high],
-                        "no_interval": prediction.no_interval,
-                        "unlike": prediction.unlike,
-                        **({} if truth is None else {"truth": truth[i]}),
-                    }
-                    for i, prediction in enumerate(predictions)
-                ],
-                "error": None if error is None else to_json(error),
-                "warnings": warnings,
-                "notes": list(notes),
-            }
-        )
-        return
+    echo_values(
+        {
+            "model": model.in_a_line,
+            "target_value": model.target.name,
+            "unit": model.target.unit,
+            "n": len(predictions),
+            "predictions": [
+                {
+                    "value": prediction.value,
+                    "interval": None if prediction.low is None else [prediction.low, prediction.high],
+                    "no_interval": prediction.no_interval,
+                    "unlike": prediction.unlike,
+                    **({} if truth is None else {"truth": truth[i]}),
+                }
+                for i, prediction in enumerate(predictions)
+            ],
+            "error": None if error is None else to_json(error),
+            "warnings": warnings,
+            "notes": list(notes),
+        }
+    )
     _print_predictions(model, predictions, truth)
     echo()
     if error is not None:

@@ -17,6 +17,7 @@ import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext, redirect_stdout
 from enum import Enum
+from io import StringIO
 from typing import IO, Final
 from unicodedata import combining, east_asian_width
 
@@ -57,22 +58,34 @@ StyleOf = Callable[[str], Style | None]
 
 
 _results: IO[str] | None = None
+_as_values = False
 
 
 @contextmanager
 def results_alone_on_stdout() -> Iterator[None]:
     """Within this context stdout has what this module prints; what a plugin prints goes to stderr."""
-    global _results
+    global _results, _as_values
     _results = sys.stdout
     try:
         with nullcontext() if sys.stdout is None else redirect_stdout(sys.stderr):
             yield
     finally:
-        _results = None
+        _results, _as_values = None, False
+
+
+def print_values_alone(asked: bool) -> None:
+    """If asked, have stdout get no text until the context of the results ends, only values."""
+    global _as_values
+    _as_values = asked
+
+
+def values_alone() -> bool:
+    """Return whether values are printed in place of text."""
+    return _as_values
 
 
 def _stream(err: bool = False) -> IO[str] | None:
-    return sys.stderr if err else _results or sys.stdout
+    return sys.stderr if err else StringIO() if _as_values else _results or sys.stdout
 
 
 def terminal_width(stream: IO[str] | None) -> int | None:
@@ -95,7 +108,7 @@ def can_redraw(stream: IO[str] | None) -> bool:
 
 def writes_unicode(stream: IO[str] | None = None) -> bool:
     """Return whether the encoding of the stream, by default that of the results, has every character."""
-    return (getattr(stream or _stream(), "encoding", None) or "ascii").lower().startswith("utf")
+    return (getattr(stream or _results or sys.stdout, "encoding", None) or "ascii").lower().startswith("utf")
 
 
 def block(stream: IO[str] | None) -> str:
@@ -148,6 +161,11 @@ def echo_entries(label: str, texts: Iterable[str], style: Style | None = None) -
 def echo_as_it_is(text: str, *, err: bool = False, end: str = "\n") -> None:
     """Print text that is neither wrapped nor coloured, such as a path, a command or a file that the output is."""
     click.echo(printable(text) + end, _stream(err), nl=False)
+
+
+def echo_text_of_values(text: str) -> None:
+    """Print what values are written as, also where `print_values_alone` keeps all other text from stdout."""
+    click.echo(printable(text), _results or sys.stdout)
 
 
 def echo_in_place(line: str) -> None:

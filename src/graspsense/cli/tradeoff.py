@@ -9,9 +9,11 @@ import click
 
 from graspsense.cli.experiment import experiment
 from graspsense.cli.options import pipeline_options, settings_of
-from graspsense.cli.output import echo_json
+from graspsense.cli.output import echo_found, echo_values, json_option, page_to_write
 from graspsense.cli.progress import ProgressLine
-from graspsense.cli.terminal import Subcommands, echo, echo_table
+from graspsense.cli.terminal import Subcommands, echo, echo_entry
+from graspsense.report.html import Page, Section, facts
+from graspsense.report.write import write_html
 
 
 @click.group(cls=Subcommands)
@@ -38,12 +40,13 @@ def tradeoff() -> None:
     show_default=True,
     help="Individuals of each object and state, for recognition; 0: leave it out.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+@click.option("--out", metavar="DIR", help="Write the page DIR/report.html as well.")
+@json_option()
 def simulation(
     scenes: tuple[str, ...],
     seeds: int,
     instances: int,
-    as_json: bool,
+    out: str | None,
     **asked: Any,
 ) -> None:
     """Run the same grasps with several accuracies and step lengths of the simulator.
@@ -52,9 +55,10 @@ def simulation(
     and halves its steps until nothing changes. Times are measured on the same grasps. Recognition is measured with the
     sensors of the gripper: a classifier learns grasps of each accuracy, and is tested on other grasps of the reference.
     """
-    from graspsense.experiments.simulation import SCENES, simulation_rows, trade_simulation
+    from graspsense.experiments.simulation import SCENES, simulation_table, trade_simulation
     from graspsense.experiments.simulation_recognition import conclusion, with_recognition
 
+    page = None if out is None else page_to_write(out)
     settings = settings_of(**asked)
     wanted = scenes or ((asked["object_name"],) if asked["object_name"] else SCENES)
     first_seed = settings.run.seed
@@ -64,15 +68,19 @@ def simulation(
         )
         if instances:
             trade = with_recognition(trade, settings, instances=instances, progress=progress)
-    if as_json:
-        echo_json(trade.as_json())
-        return
-    made = ", ".join(f"{key} {value}" for key, value in trade.made.items())
-    echo(f"{trade.gripper}, simulated: {', '.join(trade.scenes)}, {len(trade.seeds)} seeds each")
-    echo(f"{made}\n")
-    echo_table(*simulation_rows(trade))
-    if words := conclusion(trade):
+    words, table = conclusion(trade), simulation_table(trade)
+    if page is not None:
+        made = Section(id="made", title="Provenance", body=facts(list(trade.made.items())))
+        sections, title = (table.section(), made), f"Accuracy of {trade.gripper} against its run time"
+        write_html(page, Page(kind="Trade-off", title=title, answer=words or table.note, sections=sections))
+    echo_values({**trade.as_json(), "page": None if page is None else str(page)})
+    echo(f"{trade.gripper}, simulated. {table.note}")
+    echo(f"{', '.join(f'{key} {value}' for key, value in trade.made.items())}\n")
+    echo_found(table)
+    if words:
         echo(f"\n{words}")
+    if page is not None:
+        echo_entry("page", str(page))
 
 
 EXPERIMENTS: Final[Mapping[str, tuple[str, str]]] = {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -15,13 +16,13 @@ from graspsense.cli.choosing import (
     chosen,
     pipeline_beside,
     pipeline_text,
-    refuse_with_choice,
     say_chosen,
 )
-from graspsense.cli.options import target_option
-from graspsense.cli.output import check_outputs, echo_json, file_to_write_as
+from graspsense.cli.options import refuse_typed, target_option, typed
+from graspsense.cli.output import check_outputs, echo_values, file_to_write, json_option
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import (
+    SIMULATED,
     SOURCES,
     checkpoints_option,
     classifier_option,
@@ -40,6 +41,7 @@ from graspsense.core.files.whole_file import write_whole
 from graspsense.core.learn.labelled import Labelled, class_of
 from graspsense.core.settings.selected import SelectedComponent
 from graspsense.core.values.errors import ConfigError, counted
+from graspsense.core.values.label_text import natural_order
 from graspsense.evaluation.gathered_warnings import gathered_warnings
 
 if TYPE_CHECKING:
@@ -47,7 +49,7 @@ if TYPE_CHECKING:
     from graspsense.core.learn.model import Model
 
 
-_NOT_EVALUATED: Final = ("out", "keep", "overwrite", "as_json", "calibration_instances", "choose")
+_NOT_EVALUATED: Final = ("out", "keep", "overwrite", "calibration_instances", "choose")
 """Options of `train` that `evaluate` does not have."""
 
 
@@ -64,7 +66,7 @@ _NOT_EVALUATED: Final = ("out", "keep", "overwrite", "as_json", "calibration_ins
 )
 @source_argument
 @click.option(
-    "--out", metavar="FILE.json", callback=file_to_write_as(".json"), required=True, help="File of the model."
+    "--out", metavar="FILE.json", callback=file_to_write(".json"), required=True, help="File of the model."
 )
 @keep_option
 @click.option("--overwrite", is_flag=True, help="Replace the files of --out and --keep if they exist.")
@@ -83,7 +85,7 @@ _NOT_EVALUATED: Final = ("out", "keep", "overwrite", "as_json", "calibration_ins
     help="Choose classifier and features by the trials; one that is given by --classifier or -o stays.",
 )
 @source_options
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+@json_option()
 def train(
     source: str,
     out: str,
@@ -94,7 +96,6 @@ def train(
     checkpoints: str | None,
     calibration_instances: int | None,
     choose: bool,
-    as_json: bool,
     **given: Any,
 ) -> None:
     """Train a model, write it, and print what it was trained on."""
@@ -105,15 +106,13 @@ def train(
     check_outputs(out, keep, pipeline, overwrite=overwrite, sources=[source])
     times = checkpoints_of(checkpoints)
     if choose:
-        refuse_with_choice({**given, "checkpoints": times, "calibration_instances": calibration_instances})
+        refuse_typed(("checkpoints", "calibration_instances", "target_value"), "does not go with --choose")
     if given["target_value"]:
-        train_value(source, classifier, out, keep, as_json, given)
+        train_value(source, classifier, out, keep, given)
         return
     _refuse_single_scene(source)
-    trained, held_out = (
-        chosen(source, classifier, given, partial(_with_target, target=target)) if choose else None,
-        None,
-    )
+    trained = chosen(source, classifier, given, partial(_with_target, target=target)) if choose else None
+    held_out = None
     if trained is not None:
         learner, labelled = trained.learner, trained.labelled
     else:
@@ -129,15 +128,13 @@ def train(
     keep_features(keep, labelled)
     for note in notes:
         talk(f"note: {note}")
-    if as_json:
-        choice = {} if trained is None else {"pipeline": pipeline, "choice": trained.as_values()}
-        echo_json({"model": out, **_as_values(model), "trials": len(labelled), **choice})
-        return
+    choice = {} if trained is None else {"pipeline": pipeline, "choice": trained.as_values()}
+    echo_values({"model": out, **_as_values(model), "trials": len(labelled), **choice})
     _say_trained(out, model)
     if trained is not None:
         say_chosen(trained, pipeline)
     else:
-        _say_how_good(default=classifier is None and not given["options"])
+        _say_what_next(source, out, model, default=classifier is None and not given["options"])
 
 
 def _maker(learner: SelectedComponent, name: str, target: str, seed: int) -> Callable[[Labelled], Model]:
@@ -151,14 +148,23 @@ def _maker(learner: SelectedComponent, name: str, target: str, seed: int) -> Cal
         name=name,
         seed=seed,
         target=target,
-        provenance={"command": command_line(("keep", "overwrite", "as_json"))},
+        provenance={"command": command_line(("keep", "overwrite"))},
     )
 
 
-def _say_how_good(*, default: bool) -> None:
-    """Print the command that tells how good the model is, and what to do where nobody chose its features."""
-    # In one line, so that it can be copied.
+def _say_what_next(source: str, out: str, model: Model, *, default: bool) -> None:
+    """Print the commands that tell how good the model is and use it, and what to do where nobody chose its features."""
+    from graspsense.sources.trial_source import kind_of
+
+    use = f"graspsense predict {shlex.quote(out)} OTHER.csv"
+    if not is_csv(source):
+        of_run = ("pipeline", "gripper", "options", "force")
+        use = command_line({*typed()}.difference(of_run), "run")
+        use += f" -o classifier.type={model.component} -o classifier.model={shlex.quote(out)}"
+        use += "" if kind_of(source) == SIMULATED else "   (and the pipeline of these trials)"
+    # In one line each, so that they can be copied.
     echo_as_it_is(f"how good    {command_line(_NOT_EVALUATED, 'evaluate')}")
+    echo_as_it_is(f"use it      {use}")
     if default:
         echo_entry(
             "choice", "classifier and features are the defaults; --choose finds those that suit the trials"
@@ -239,7 +245,7 @@ def _say_trained(out: str, model: Model) -> None:
     from graspsense.core.learn.conformal import units_needed
 
     echo(f"{out}: {model.in_a_line}", indent=2)
-    echo_entry("labels", ", ".join(model.classifier.classes()))
+    echo_entry("labels", ", ".join(natural_order(model.classifier.classes())))
     if model.sets is not None:
         echo_entry("sets", model.sets.in_words)
         if model.sets.trials:
@@ -276,7 +282,7 @@ def _refuse_single_scene(source: str) -> None:
 
 def _with_target(labelled: Labelled, target: str) -> Labelled:
     """Return the trials with the labels that the target asks for. Raises ConfigError if a model cannot learn them."""
-    classes = sorted({class_of(label) for label in labelled.labels})
+    classes = natural_order(map(class_of, labelled.labels))
     if target == "state" and len(classes) > 1:
         raise ConfigError(
             "a model of states is for a single class; select it with --only: " + ", ".join(classes)

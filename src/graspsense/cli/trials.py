@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from graspsense.cli.output import echo_json
+from graspsense.cli.output import echo_values, json_option
 from graspsense.cli.sources import named_store
 from graspsense.cli.terminal import Subcommands, echo, echo_table
 from graspsense.core.learn.target_value import value_label
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 HEADER: Final = ("TRIAL", "MADE", "LABEL", "INSTANCE", "OUTCOME", "GRIPPER", "STATE")
 
 _REFS = click.argument("refs", nargs=-1, required=True, metavar="DIR#NUMBER...")
-_JSON = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+_JSON = json_option()
 
 
 @click.group(cls=Subcommands)
@@ -41,7 +41,7 @@ def trials() -> None:
 @click.option("--aside/--not-aside", default=None, help="Only trials that are set aside, or only the others.")
 @click.option("--limit", type=click.IntRange(min=1), default=50, show_default=True, help="Number of trials.")
 @_JSON
-def list_trials(folder: str, label: str | None, aside: bool | None, limit: int, as_json: bool) -> None:
+def list_trials(folder: str, label: str | None, aside: bool | None, limit: int) -> None:
     """List the newest trials of the store DIR, newest first."""
     from graspsense.store.store import Store
 
@@ -49,9 +49,7 @@ def list_trials(folder: str, label: str | None, aside: bool | None, limit: int, 
         page = store.page(label=label, set_aside=aside, limit=limit)
         changes = history(store)
     last_relabel = {change.trial: change for change in changes if change.action == "relabel"}
-    if as_json:
-        echo_json([{**trial.as_json(), "relabelled": trial.id in last_relabel} for trial in page])
-        return
+    echo_values([{**trial.as_json(), "relabelled": trial.id in last_relabel} for trial in page])
     rows = []
     for trial in page:
         states = [f"set aside: {trial.set_aside}" if trial.set_aside is not None else ""]
@@ -72,7 +70,7 @@ def list_trials(folder: str, label: str | None, aside: bool | None, limit: int, 
 @click.option("--as-recorded", is_flag=True, help="Restore the label with which the trial was recorded.")
 @click.option("--why", metavar="TEXT", default="", help="Reason, kept in the history.")
 @_JSON
-def relabel(refs: Sequence[str], label: str | None, as_recorded: bool, why: str, as_json: bool) -> None:
+def relabel(refs: Sequence[str], label: str | None, as_recorded: bool, why: str) -> None:
     """Change the label of trials; `history` shows the one before.
 
     A trial of a simulated gripper keeps the label of the object that was simulated.
@@ -89,7 +87,7 @@ def relabel(refs: Sequence[str], label: str | None, as_recorded: bool, why: str,
                 _refuse_contradiction(store.trial(number), label)
         changes.relabel(store, numbers, labels, why)
 
-    _change(refs, change, as_json)
+    _change(refs, change)
 
 
 @trials.command("value")
@@ -100,9 +98,7 @@ def relabel(refs: Sequence[str], label: str | None, as_recorded: bool, why: str,
 )
 @click.option("--why", metavar="TEXT", default="", help="Reason, kept in the history.")
 @_JSON
-def change_value(
-    refs: Sequence[str], value: str | None, as_recorded: str | None, why: str, as_json: bool
-) -> None:
+def change_value(refs: Sequence[str], value: str | None, as_recorded: str | None, why: str) -> None:
     """Change a number to predict of trials, or give them one; `history` shows the one before.
 
     `train`, `evaluate` and `report` use these numbers with --target-value.
@@ -112,35 +108,35 @@ def change_value(
     if (value is None) == (as_recorded is None):
         raise click.UsageError('give either --value "NAME [UNIT]=NUMBER" or --as-recorded NAME')
     heading, cell = (as_recorded or "", None) if value is None else value_label(value)
-    _change(refs, lambda store, numbers: changes.set_number(store, numbers, heading, cell, why), as_json)
+    _change(refs, lambda store, numbers: changes.set_number(store, numbers, heading, cell, why))
 
 
 @trials.command()
 @_REFS
 @click.option("--why", metavar="TEXT", required=True, help="Reason, shown in lists and kept in the history.")
 @_JSON
-def aside(refs: Sequence[str], why: str, as_json: bool) -> None:
+def aside(refs: Sequence[str], why: str) -> None:
     """Set trials aside: they stay in the store, but are not counted, exported as a table, or learned from."""
     from graspsense.store import changes
 
-    _change(refs, lambda store, numbers: changes.set_aside(store, numbers, why), as_json)
+    _change(refs, lambda store, numbers: changes.set_aside(store, numbers, why))
 
 
 @trials.command()
 @_REFS
 @click.option("--why", metavar="TEXT", default="", help="Reason, kept in the history.")
 @_JSON
-def restore(refs: Sequence[str], why: str, as_json: bool) -> None:
+def restore(refs: Sequence[str], why: str) -> None:
     """Bring trials back that were set aside."""
     from graspsense.store import changes
 
-    _change(refs, lambda store, numbers: changes.restore(store, numbers, why), as_json)
+    _change(refs, lambda store, numbers: changes.restore(store, numbers, why))
 
 
 @trials.command("history")
 @click.argument("source", metavar="DIR|DIR#NUMBER", callback=named_store)
 @_JSON
-def show_history(source: str, as_json: bool) -> None:
+def show_history(source: str) -> None:
     """Print the changes of all trials of the store DIR, or of one trial, the oldest first."""
     from graspsense.store.store import Store
     from graspsense.store.stored_grasps import parse_trial_ref
@@ -148,9 +144,7 @@ def show_history(source: str, as_json: bool) -> None:
     folder, number = (source, None) if Path(source).is_dir() else parse_trial_ref(source)
     with Store.read(folder) as store:
         changes = history(store, number)
-    if as_json:
-        echo_json([change.as_json() for change in changes])
-        return
+    echo_values([change.as_json() for change in changes])
     if not changes:
         echo("nothing was changed after recording")
     rows = [
@@ -160,7 +154,7 @@ def show_history(source: str, as_json: bool) -> None:
     echo_table(("TRIAL", "WHEN", "CHANGE", "WHY"), rows)
 
 
-def _change(refs: Sequence[str], change: Callable[[Store, Sequence[int]], None], as_json: bool) -> None:
+def _change(refs: Sequence[str], change: Callable[[Store, Sequence[int]], None]) -> None:
     """Change trials of one store, all or none, and print what was done to each."""
     from graspsense.store.store import Store
     from graspsense.store.stored_grasps import parse_trial_ref
@@ -177,9 +171,7 @@ def _change(refs: Sequence[str], change: Callable[[Store, Sequence[int]], None],
         earlier = len(history(store))
         change(store, [number for _, number in trials])
         done = history(store)[earlier:]
-    if as_json:
-        echo_json({"store": folder, "changes": [change_.as_json() for change_ in done]})
-        return
+    echo_values({"store": folder, "changes": [change_.as_json() for change_ in done]})
     for change_ in done:
         echo(
             f"trial {change_.trial}: {change_.words}" + (f" ({change_.why})" if change_.why else ""), indent=2

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
+from difflib import get_close_matches
 from pathlib import Path
 
 import click
@@ -72,30 +73,24 @@ def _misplaced_words(context: click.Context, arguments: Sequence[str]) -> Iterat
     with suppress(click.UsageError):
         _, left, _ = command.make_parser(context).parse_args(words)
         for word in left:
-            option = _option_for(word)
+            option, value = _option_for(word)
             if option == "--object" and "--labels" in options:
                 option = "--labels"
             if option in options and word[:1].isalpha():
-                yield f"Write {option} {word}"
+                yield f"Write {option} {value}"
 
 
-def _option_for(word: str) -> str:
-    """Return the option whose value this word probably is."""
+def _option_for(word: str) -> tuple[str, str]:
+    """Return the option whose value this word probably is, and that value: of a name nearly written, the name."""
     if word.endswith(".toml"):
         with suppress(GraspsenseError):
-            return (
-                "--object"
-                if toml_kind(read_toml(Path(word), word, "TOML").values) == "scene"
-                else "--pipeline"
-            )
-        return "--pipeline"
+            if toml_kind(read_toml(Path(word), word, "TOML").values) == "scene":
+                return "--object", word
+        return "--pipeline", word
     if "=" in word:
-        return "-o"
-
-    if word in {component.name for component in installed().components("sensor-backend")}:
-        return "--gripper"
-    return (
-        "--pipeline"
-        if word in {pipeline.name for pipeline in installed().resources(PipelineEntry)}
-        else "--object"
-    )
+        return "-o", word
+    options = {component.name: "--gripper" for component in installed().components("sensor-backend")}
+    options |= {pipeline.name: "--pipeline" for pipeline in installed().resources(PipelineEntry)}
+    # Objects are not asked for: a word that is hardly like the name of a pipeline is one of them.
+    near = word if word in options else next(iter(get_close_matches(word, options, n=1, cutoff=0.8)), "")
+    return (options[near], near) if near else ("--object", word)

@@ -15,7 +15,7 @@ from graspsense.core.learn.confounding import confounded
 from graspsense.core.learn.labelled import TARGETS, Labelled, Target, class_of
 from graspsense.core.settings.selected import select_component
 from graspsense.core.values.errors import ConfigError, counted
-from graspsense.core.values.label_text import alike_words, spelled_alike
+from graspsense.core.values.label_text import alike_words, natural_order, spelled_alike
 from graspsense.evaluation.controls import PERMUTATIONS, ControlMeasurements
 from graspsense.evaluation.crossval import ClassifierFactory
 from graspsense.evaluation.evaluator import Evaluator, Progress
@@ -142,8 +142,8 @@ def notes_on(trials: Labelled, k: int) -> Iterator[str]:
 
 def _on_small_labels(trials: Labelled, k: int) -> Iterator[str]:
     counts = Counter(trials.labels)
-    single = sorted(label for label, n in counts.items() if n == 1)
-    few = sorted(label for label, n in counts.items() if 1 < n < k)
+    single = natural_order(label for label, n in counts.items() if n == 1)
+    few = natural_order(label for label, n in counts.items() if 1 < n < k)
     if single:
         yield f"labels with a single trial, which no fold can predict: {', '.join(single)}"
     if few:

@@ -12,6 +12,7 @@ from attrs import define, evolve, frozen
 from graspsense.core.learn.answers import Answers
 from graspsense.core.learn.labelled import Labelled, Target, class_of
 from graspsense.core.values.features import FeatureTable
+from graspsense.core.values.label_text import natural_order
 from graspsense.evaluation.crossval import ClassifierFactory, FitRefused, cross_validate
 from graspsense.evaluation.doubt import HeldOut
 from graspsense.evaluation.folds import (
@@ -118,7 +119,7 @@ class Evaluator:
         rows: dict[str, list[int]] = {}
         for i, label in enumerate(self.labels):
             rows.setdefault(class_of(label), []).append(i)
-        return {name: self.rate_among(right, of_class) for name, of_class in sorted(rows.items())}
+        return {name: self.rate_among(right, rows[name]) for name in natural_order(rows)}
 
     def unknown(self, pooled: Answers) -> RecognitionRate:
         """Return the share of trials that the model of their fold calls unknown, or that have no feature at all."""
@@ -203,7 +204,7 @@ class Evaluator:
         of_label: dict[str, set[str]] = {}
         for instance, label in zip(instances, self.labels, strict=True):
             of_label.setdefault(label, set()).add(instance)
-        single = sorted(label for label, objects in of_label.items() if len(objects) == 1)
+        single = natural_order(label for label, objects in of_label.items() if len(objects) == 1)
         if single:
             reason = f"labels with a single instance, which cannot be held out: {', '.join(single)}"
             return None, Measurement(what, reason=reason)

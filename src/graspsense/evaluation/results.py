@@ -9,6 +9,7 @@ from attrs import field, frozen
 
 from graspsense.core.learn.labelled import Target, recognised
 from graspsense.core.values.display import sentence, table
+from graspsense.core.values.label_text import natural_order
 from graspsense.core.values.printable import in_one_line
 from graspsense.evaluation.doubt import Reliability, SetCoverage
 from graspsense.evaluation.intervals import Difference, RecognitionRate
@@ -33,8 +34,8 @@ class Confusion:
 
 
 def confusion(true: Sequence[str], predicted: Sequence[str]) -> Confusion:
-    """Return the confusion matrix over all labels that occur on either side, sorted."""
-    labels = tuple(sorted({*true, *predicted}))
+    """Return the confusion matrix over all labels that occur on either side, in natural order."""
+    labels = tuple(natural_order([*true, *predicted]))
     numbers = {label: i for i, label in enumerate(labels)}
     counts = [[0] * len(labels) for _ in labels]
     for actual, answer in zip(true, predicted, strict=True):

@@ -56,7 +56,9 @@ class ConditionDifference:
 
     @property
     def verdict(self) -> str:
-        """Whether the rate is shown to be higher or lower, in words."""
+        """Whether the rate is shown to be higher or lower, in words; `equal` where every seed has the same answers."""
+        if self.base.by_seed == self.other.by_seed:
+            return "equal"
         interval = self.difference.interval
         if interval is None or interval[0] <= 0.0 <= interval[1]:
             return "not shown to differ"
@@ -81,14 +83,16 @@ class ExperimentComparison:
     def answer(self) -> str:
         """The first of the differences and the number of settings that differ, in a few sentences."""
         told = [f"{self.names} have no case in common."]
-        if self.differences:
+        if self.differences and {difference.verdict for difference in self.differences} == {"equal"}:
+            told = [f"{self.names} have the same results."]
+        elif self.differences:
             shown = self.differences[0]
             told = [
                 f"{condition_name(shown.other)}, {TARGETS[shown.other.recognised]}: {shown.other_name} minus "
                 f"{self.experiments[0].name} is {shown.difference.words}, {shown.verdict}, {shown.how}."
             ]
-        if len(self.differences) > 1:
-            told.append(f"The table has {len(self.differences) - 1} more.")
+            if len(self.differences) > 1:
+                told.append(f"The table has {len(self.differences) - 1} more.")
         count = len(self.settings)
         differ = counted(count, "setting differs", "settings differ")
         told.append(f"{differ if count else 'No setting differs'}.")
@@ -138,11 +142,8 @@ def compare_experiments(paths: Sequence[str]) -> ExperimentComparison:
     folders = [_folder(path) for path in paths]
     if len(folders) < 2:
         raise ConfigError("give at least two experiments to compare: graspsense experiment compare A B")
-    seen: dict[Path, str] = {}
-    for path, folder in zip(paths, folders, strict=True):
-        earlier = seen.setdefault(folder.resolve(), path)
-        if earlier is not path:
-            raise ConfigError(f"{earlier} and {path} are the same experiment: name different ones")
+    if len({folder.resolve() for folder in folders}) < len(folders):
+        raise ConfigError(f"two of {', '.join(paths)} are the same experiment: name different ones")
     short = [folder.resolve().name for folder in folders]
     names = short if len(set(short)) == len(short) else [str(folder) for folder in folders]
     experiments = tuple(_read(name, folder) for name, folder in zip(names, folders, strict=True))

@@ -59,7 +59,11 @@ class Account:
 
 
 def refuse_store(folder: Path) -> None:
-    """Raise ConfigError if `folder` is a store of trials, whose page the page of an experiment would replace."""
+    """Raise ConfigError if `folder` is a file, or a store of trials, whose page that of an experiment would replace."""
+    if any(path.is_file() for path in (folder, *folder.parents)):
+        raise ConfigError(
+            f"{folder} is no folder: name one for the results ({option('out', python='Results')})"
+        )
     if (folder / STORE_FILE).exists():
         raise ConfigError(
             f"{folder} is a store of trials, and the page of an experiment would replace its own: name another "

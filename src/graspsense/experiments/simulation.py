@@ -13,9 +13,10 @@ import numpy as np
 from attrs import asdict, evolve, field, frozen
 
 from graspsense.core.components.roles import BatchBackend, Grasped, SimulationVariant
-from graspsense.core.values.errors import ConfigError, named
+from graspsense.core.values.errors import ConfigError, counted, named
 from graspsense.evaluation.intervals import Difference, RecognitionRate, percent
 from graspsense.experiments.versions import measured_on
+from graspsense.report.found_table import FoundTable
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -24,8 +25,6 @@ if TYPE_CHECKING:
     from graspsense.core.values.features import Features
     from graspsense.core.values.trace import Trace
 
-HEADER: Final = ("METHOD", "FIDELITY", "STEP OR ACCURACY", "MS A GRASP", "SET-UP, S")
-RECOGNITION: Final = ("RECOGNISED", "REFERENCE LESS THIS")
 PEAK: Final = "peak force"
 TRACE: Final = "force trace, rms"
 SCENES: Final = (
@@ -84,26 +83,32 @@ class SimulationTrade:
         return asdict(self)
 
 
-def simulation_rows(trade: SimulationTrade) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Return the header and the rows of the table: time, set-up and the largest error of each quantity."""
-    header = (*HEADER, *(name.upper() for name in trade.quantities), *RECOGNITION, "")
-    rows = []
-    for point in trade.points:
-        errors = [_short(point.errors.get(name, math.nan)) for name in trade.quantities]
-        note = point.failure or ("the reference" if point.role == "reference" else "")
-        seconds, setup = (
-            f"{v:.3g}" if math.isfinite(v) else "-" for v in (1e3 * point.seconds, point.setup_s)
-        )
-        recognised = (
-            percent(point.recognised.rate) if point.recognised else "-",
-            point.behind.points if point.behind else "-",
-        )
-        rows.append((point.method, point.fidelity, point.step, seconds, setup, *errors, *recognised, note))
-    return header, rows
+def simulation_table(trade: SimulationTrade) -> FoundTable:
+    """Return the table: time, set-up, the largest error of each quantity, and recognition."""
+    errors = (f"{name} [%]" for name in trade.quantities)
+    return FoundTable(
+        id="methods",
+        title="Time and error of each method",
+        header=(
+            *("method", "fidelity", "step or accuracy", "time [ms]", "set-up [s]"),
+            *(*errors, "recognised", "behind [points]", "note"),
+        ),
+        rows=tuple(_cells(point, trade.quantities) for point in trade.points),
+        note=f"Scenes: {', '.join(trade.scenes)}; {counted(len(trade.seeds), 'seed')} each. Times are of one grasp. "
+        "Errors are the largest ones, in percent of the reference. Behind is the rate of the reference less this one.",
+        numbers=3,
+    )
 
 
-def _short(error: float) -> str:
-    return "-" if math.isnan(error) else ("inf" if math.isinf(error) else f"{error:.1e}")
+def _cells(point: VariantPoint, quantities: Sequence[str]) -> tuple[str, ...]:
+    seconds, setup = (f"{v:.3g}" if math.isfinite(v) else "-" for v in (1e3 * point.seconds, point.setup_s))
+    return (
+        *(point.method, point.fidelity, point.step, seconds, setup),
+        *(f"{100.0 * point.errors[name]:.1e}" if name in point.errors else "-" for name in quantities),
+        percent(point.recognised.rate) if point.recognised else "-",
+        point.behind.points if point.behind else "-",
+        point.failure or ("the reference" if point.role == "reference" else ""),
+    )
 
 
 def trade_simulation(

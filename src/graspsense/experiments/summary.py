@@ -12,6 +12,7 @@ from attrs import evolve, field, frozen
 from graspsense.core.components.caller import option
 from graspsense.core.learn.labelled import Target, recognised
 from graspsense.core.values.errors import ConfigError, counted, listed
+from graspsense.core.values.label_text import natural_order
 from graspsense.evaluation.intervals import RecognitionRate
 from graspsense.evaluation.over_seeds import MeanDifference, OverSeeds, mean_difference
 from graspsense.evaluation.results import Confusion
@@ -103,7 +104,7 @@ class ConditionResult:
     def confusion(self) -> Confusion:
         """The sum of the confusion matrices of all seeds."""
         matrices = [result.confusion for result in self.by_seed.values()]
-        labels = sorted({label for matrix in matrices for label in matrix.labels})
+        labels = natural_order(label for matrix in matrices for label in matrix.labels)
         place = {label: k for k, label in enumerate(labels)}
         counts = [[0] * len(labels) for _ in labels]
         for matrix in matrices:

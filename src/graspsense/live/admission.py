@@ -67,7 +67,8 @@ def why_not(option: str, host: str, port: int, error: OSError) -> str:
     """Return why an address cannot be listened on, as a message about the option that named it."""
     if error.errno == errno.EADDRINUSE:
         return f"{option}: port {port} of {host} is taken: name another one, or leave it out for a free one"
-    return f"{option}: cannot listen on {host}, port {port}: {error.strerror or error}"
+    place, why = f"{host}, port {port}" if port else host, error.strerror or error
+    return f"{option}: cannot listen on {place}: {why}. Name an address of this machine, as in 127.0.0.1:8700"
 
 
 def say(answer: dict[str, Any]) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from html import escape
 from typing import Final
 
+from graspsense.core.values.label_text import natural_order
 from graspsense.core.values.reasons import TreeNode
 from graspsense.evaluation.doubt import Reliability, SetCoverage
 from graspsense.evaluation.intervals import percent
@@ -56,7 +57,8 @@ def doubt_section(sets: SetCoverage, reliability: Reliability) -> Section:
             name = f"labels recognised in less than {100 * sets.asked:.0f} %"
             rows.append(RateRow(name=name, rate=below.rate, interval=below.interval, strong=True))
         rows += [
-            RateRow(name=name, rate=rate.rate, interval=rate.interval) for name, rate in sets.by_label.items()
+            RateRow(name=name, rate=sets.by_label[name].rate, interval=sets.by_label[name].interval)
+            for name in natural_order(sets.by_label)
         ]
         text += (
             f" In held-out grasps the sets contain it in {sets.covered.words}. They have {sets.mean_size:.2f} "

@@ -38,7 +38,7 @@ class Page:
 
     kind: str
     title: str
-    question: str
+    question: str = ""
     answer: str
     headline: str = ""
     beside: str = ""

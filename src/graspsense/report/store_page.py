@@ -11,6 +11,7 @@ from graspsense.core.learn.copies import without_copies
 from graspsense.core.learn.labelled import Target
 from graspsense.core.settings.selected import select_component
 from graspsense.core.values.errors import ConfigError, DataDamaged, counted
+from graspsense.core.values.label_text import natural_order
 from graspsense.evaluation.evaluate import evaluate
 from graspsense.evaluation.results import Evaluation
 from graspsense.recording.labelled_recording import UnreadableRecording
@@ -150,12 +151,12 @@ def _curves(store: Store) -> tuple[list[GraspCurve], list[UnreadableRecording]]:
 
 
 def _newest_of_labels(curves: Sequence[GraspCurve]) -> list[GraspCurve]:
-    """Return the newest grasps of each label, the labels in alphabetical order."""
+    """Return the newest grasps of each label, the labels in natural order."""
     by_label: dict[str, list[GraspCurve]] = {}
     for curve in curves:
         if curve.label != NO_LABEL:
             by_label.setdefault(curve.label, []).append(curve)
-    return [curve for label in sorted(by_label) for curve in by_label[label][:GRASPS]]
+    return [curve for label in natural_order(by_label) for curve in by_label[label][:GRASPS]]
 
 
 def _answer(evaluation: Evaluation | None, total: int, problem: str) -> str:
@@ -236,7 +237,8 @@ def _provenance(
             for name, component in (made.get("components") or {}).items()
         ),
     ]
-    by_label = [tuple(map(str, count)) for count in counts]
+    order = natural_order(label for label, *_ in counts)
+    by_label = [tuple(map(str, count)) for count in sorted(counts, key=lambda count: order.index(count[0]))]
     rows = [
         (
             str(summary.id),

@@ -11,6 +11,7 @@ import numpy as np
 from graspsense.core.components.registry import installed
 from graspsense.core.learn.labelled import class_of
 from graspsense.core.values.errors import counted
+from graspsense.core.values.label_text import natural_order
 from graspsense.core.values.signals import Phase
 from graspsense.core.values.units import display_unit, in_words, without_underscores
 from graspsense.report.grasp_curve import GraspCurve, peak_in_words
@@ -76,7 +77,7 @@ def traces_by_class(grasps: Sequence[GraspCurve]) -> str:
         classes.setdefault(class_of(grasp.label), []).append(grasp)
     if not any(grasp.shown_times for grasp in grasps):
         return ""
-    return panels([_traces(name, curves, grasps) for name, curves in sorted(classes.items())])
+    return panels([_traces(name, classes[name], grasps) for name in natural_order(classes)])
 
 
 def _traces(name: str, grasps: Sequence[GraspCurve], all_grasps: Sequence[GraspCurve]) -> str:
@@ -176,7 +177,7 @@ def _feature(
 ) -> str:
     shown, factor = display_unit(unit)
     title = f"{name}, {shown}" if shown else name
-    by_label: dict[str, list[float]] = {label: [] for label in sorted(set(labels))}
+    by_label: dict[str, list[float]] = {label: [] for label in natural_order(labels)}
     for label, value in zip(labels, column, strict=True):
         if value is not None:
             by_label[label].append(factor * value)

@@ -28,6 +28,7 @@ from graspsense.core.settings.resolved import Settings
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import ComponentFailed, ConfigError, counted, named
 from graspsense.core.values.features import FeatureRows, Features
+from graspsense.core.values.label_text import natural_order
 from graspsense.core.values.limits import CLASSES
 from graspsense.core.values.trace import Trace
 from graspsense.recording.before_contact import (
@@ -264,7 +265,7 @@ def _doubts(report: Mapping[str, Any]) -> Iterator[str]:
 
 def _doubt_note(doubt: str, labels: Sequence[str], total: int) -> str:
     """Return in how many grasps, and of which objects, the figures may be inaccurate."""
-    names = sorted(set(labels))
+    names = natural_order(labels)
     more = f" and {len(names) - NAMED} others" if len(names) > NAMED else ""
     return f"{len(labels)} of {counted(total, 'grasp')} ({', '.join(names[:NAMED])}{more}): {doubt}"
 

@@ -241,15 +241,23 @@ class Store:
     def columns(
         self, names: Sequence[str], where: str, values: Sequence[object] = ()
     ) -> dict[str, tuple[Any, ...]]:
-        """Return these columns of the trials that an SQL condition selects, oldest first; `device` is its name."""
+        """Return these columns of the trials that an SQL condition selects, oldest first; `device` is its name.
+
+        Raises DataDamaged for a trial whose details are lost, unless it is set aside; then it is left out.
+        """
         selected = ", ".join(
             f'{"detail" if name in DETAIL_COLUMNS and name != "device" else "trial"}."{name}"'
             for name in names
         )
-        query = (
-            f"SELECT {selected} FROM trial JOIN detail ON detail.trial = trial.id WHERE {where} ORDER BY id"
-        )
-        rows = self.query(query, values)
+        query = f"FROM trial LEFT JOIN detail ON detail.trial = trial.id WHERE {where}"
+        for (lost,) in self.query(
+            f"SELECT id {query} AND detail.trial IS NULL AND set_aside IS NULL", values
+        ):
+            raise DataDamaged(
+                f"trial {lost} of {self.folder} has lost its details, such as its settings. To do without it: "
+                f"graspsense trials aside {self.folder}#{lost} --why lost"
+            )
+        rows = self.query(f"SELECT {selected} {query} AND detail.trial IS NOT NULL ORDER BY id", values)
         return dict(zip(names, zip(*rows, strict=True) if rows else [()] * len(names), strict=True))
 
     def recording_names(self) -> set[str]:

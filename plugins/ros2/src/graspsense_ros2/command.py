@@ -64,6 +64,8 @@ def ros2(
         for name, offered in ((GRASP, grasps), (GRIPPER_COMMAND, moves)):
             if offered:
                 click.echo(f"offered: {name}", err=True)
+        gripper = loaded.settings.gripper.component.qualified
+        click.echo(f"waiting: gripper {gripper} is opened at the first request. Ctrl-C ends it", err=True)
         server.serve()
     except KeyboardInterrupt:
         click.echo("", err=True)
@@ -145,6 +147,7 @@ class GripperServer:
                 self._held.release()
             trial = self._pipeline.grasp(sinks=[self._feed])
         except GraspsenseError as error:
+            click.echo(f"no grasp: {error}", err=True)
             return {"success": False, "message": str(error)}
         self._feed.finished(trial)
         click.echo(f"grasp: {trial.outcome.words}", err=True)

@@ -30,6 +30,7 @@ from attrs import frozen
 from graspsense.core.learn.answers import Answers
 from graspsense.core.learn.certainty import Certainty
 from graspsense.core.learn.stored_values import StoredValues
+from graspsense.core.values.label_text import natural_order
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -80,7 +81,7 @@ def units_lacking(
     by_instance = can_be_held_out(counts) and all(instance is not None for _, instance in counts)
     have = Counter(label for label, _ in counts) if by_instance else trials
     needed = units_needed(coverage)
-    lacking = {label: max(needed - n, 0) for label, n in sorted(have.items())}
+    lacking = {label: max(needed - have[label], 0) for label in natural_order(have)}
     return ("instances" if by_instance else "trials"), lacking
 
 

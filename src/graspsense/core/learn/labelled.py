@@ -13,7 +13,7 @@ from graspsense.core.components.caller import option
 from graspsense.core.learn.target_value import TargetValue
 from graspsense.core.values.errors import ConfigError, DataDamaged, counted, suggestion
 from graspsense.core.values.features import LARGEST_VALUE, FeatureTable
-from graspsense.core.values.label_text import label_text
+from graspsense.core.values.label_text import label_text, natural_order
 from graspsense.core.values.limits import CLASSES, FEATURES
 from graspsense.core.values.printable import in_one_line
 
@@ -232,7 +232,7 @@ def rows_of_class(labels: Sequence[str], name: str, source: str) -> list[int]:
     """Return the numbers of the trials of one class of this source. Raises ConfigError if there are none."""
     rows = [row for row, label in enumerate(labels) if class_of(label) == name]
     if not rows:
-        known = sorted(set(map(class_of, labels)))
+        known = natural_order(map(class_of, labels))
         told = f"no trial of class {name!r} in {source}. Known: {', '.join(known)}."
         raise ConfigError(told + suggestion(name, known))
     return rows

@@ -103,21 +103,26 @@ def _features_of(model: Model) -> str:
 def _how_to_train(settings: Settings, out: str) -> str:
     """Return the commands that make a model for these settings: of simulated trials where the gripper is simulated."""
     assert settings.classifier is not None
-    name = settings.classifier.component.name
-    selection = f"--gripper {settings.gripper.component.name}"
-    if settings.pipeline.endswith(".toml"):
-        selection = f"--pipeline {shlex.quote(settings.pipeline)}"
-    for part in (settings.controller, settings.features):
+    learner = settings.classifier.component.name
+    selected = [] if settings.pipeline == "default" else [f"--pipeline {shlex.quote(settings.pipeline)}"]
+    if not selected or settings.origins["gripper.type"].startswith("-"):
+        selected.append(f"--gripper {settings.gripper.component.name}")
+    for part in (settings.gripper, settings.controller, settings.features):
         table = part.component.table
         for key, value in settings.values[table].items():
-            if settings.origins.get(f"{table}.{key}", "").startswith("-o"):
+            name = f"{table}.{key}"
+            if settings.origins.get(name, "").startswith("-o") and name not in (
+                "gripper.type",
+                "gripper.object",
+            ):
                 text = part.component.name if key == "type" else toml_value(value)
-                selection += f" -o {table}.{key}={text}"
+                selected.append(f"-o {shlex.quote(f'{name}={text}')}")
+    selection = " ".join(selected)
     if settings.gripper.create().objects():
-        return f"  train one: graspsense train simulated {selection} --classifier {name} --out {out}"
+        return f"  train one: graspsense train simulated {selection} --classifier {learner} --out {out}"
     return (
         f"  collect trials of this gripper: graspsense collect {selection} --labels can:full,can:empty --save trials\n"
-        f"  then train: graspsense train store:trials --classifier {name} --out {out}"
+        f"  then train: graspsense train store:trials --classifier {learner} --out {out}"
     )
 
 

@@ -31,7 +31,7 @@ def check(settings: Settings) -> None:
     misfits = [misfit for user in users for misfit in _channel_misfits(settings.gripper, user)]
     misfits += _command_misfits(settings.gripper, settings.controller)
     if misfits:
-        advice = [*_pipelines_of(settings.gripper.component), *_fitting(settings)]
+        advice = [*_pipelines_of(settings), *_fitting(settings)]
         raise WiringError("\n  ".join(["the components do not fit together:", *misfits, *advice]))
     if too_small := [*_too_small(settings)]:
         raise WiringError("\n  ".join(["the gripper cannot do as little as is asked:", *too_small]))
@@ -91,9 +91,12 @@ def _too_small(settings: Settings) -> Iterator[str]:
             )
 
 
-def _pipelines_of(gripper: Component) -> Iterator[str]:
-    """Yield how to choose an installed pipeline that is for this gripper."""
+def _pipelines_of(settings: Settings) -> Iterator[str]:
+    """Yield how to choose an installed pipeline that is for this gripper, and of which no setting is used yet."""
+    gripper, used = settings.gripper.component, " ".join(settings.origins.values())
     for pipeline in installed().resources(PipelineEntry):
+        if f"pipeline {pipeline.qualified}:" in used:
+            continue
         try:
             values = read_toml(pipeline.file(), pipeline.qualified, "pipeline").values
         except GraspsenseError:

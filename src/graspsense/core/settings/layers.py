@@ -32,12 +32,11 @@ from graspsense.core.values.errors import ConfigError, UnknownName
 class TomlKind(NamedTuple):
     """A kind of TOML file.
 
-    `called` is what it is, `place` what can be named where it is expected; `marks` are keys by which it is recognised,
-    `needed` those of which it must have one; `use` is a command that takes it.
+    `called` is what it is; `marks` are keys by which it is recognised, `needed` those of which it must have one; `use`
+    is a command that takes it.
     """
 
     called: str
-    place: str
     marks: frozenset[str]
     needed: frozenset[str]
     use: str
@@ -47,14 +46,12 @@ _PIPELINE: Final = frozenset({"extends", "run", *TABLE_OF_ROLE.values()})
 KINDS: Final[Mapping[str, TomlKind]] = {
     "pipeline": TomlKind(
         called="a pipeline",
-        place="a pipeline",
         marks=_PIPELINE,
         needed=_PIPELINE,
         use="graspsense run --pipeline {file}",
     ),
     "scene": TomlKind(
         called="a scene",
-        place="a scene",
         marks=frozenset(
             {"width_m", "terms", "mass_kg", "patch", "share", "friction", "offset_m", "identified"}
         ),
@@ -63,15 +60,13 @@ KINDS: Final[Mapping[str, TomlKind]] = {
     ),
     "experiment": TomlKind(
         called="an experiment",
-        place="an experiment",
         marks=frozenset({"title", "question", "kind", "parts", "seeds", "sweep", "data", "judge", "variants"})
         | (_PIPELINE - {"extends", "classifier"}),
         needed=frozenset({"title"}),
         use="graspsense experiment {file}",
     ),
     "manifest": TomlKind(
-        called="a manifest",
-        place="a recording, nor a manifest of recordings",
+        called="a manifest of recordings",
         marks=frozenset(
             {"files", "list", "time", "gap", "force", "left", "right", "label", "rate_hz", "zero"}
         ),
@@ -101,7 +96,7 @@ def refuse_other_kind(values: Mapping[str, Any], expected: str, file: str) -> No
     if kind_found != expected:
         kind = KINDS[kind_found]
         raise ConfigError(
-            f"{file} is {kind.called}, not {KINDS[expected].place}. Use it as in: {kind.use.format(file=file)}"
+            f"{file} is {kind.called}, not {KINDS[expected].called}. Use it as in: {kind.use.format(file=file)}"
         )
 
 
@@ -109,8 +104,8 @@ def refuse_other_kind(values: Mapping[str, Any], expected: str, file: str) -> No
 class Layer:
     """Values from one origin.
 
-    `label` names the origin; `typed` is what the user typed, for an origin that is not a file. A `final` layer applies
-    to the component that is selected in the end. Of any other layer, the keys of a table are dropped if a later layer
+    `label` names the origin; `typed` is what the user typed, for an origin that is not a file. What is typed applies to
+    the component that is selected in the end. Of any other layer, the keys of a table are dropped if a later layer
     changes the `type` of the table.
     """
 
@@ -118,7 +113,6 @@ class Layer:
     values: Mapping[str, Any]
     lines: Mapping[KeyPath, int] = field(factory=dict)
     typed: str = ""
-    final: bool = False
 
     def where(self, path: KeyPath) -> str:
         """Return the place of a key, with its line where there is one."""
@@ -146,7 +140,7 @@ class Flag:
     def layer(self) -> Layer:
         """Return it as a layer."""
         values = _nested(self.key.split("."), self.value)
-        return Layer(label=self.name, values=values, typed=f"{self.name} {self.value}", final=True)
+        return Layer(label=self.name, values=values, typed=f"{self.name} {self.value}")
 
 
 @define
@@ -156,11 +150,14 @@ class Merged:
     values: dict[str, Any] = field(factory=dict)
     owner: dict[KeyPath, Layer] = field(factory=dict)
 
-    def add(self, path: KeyPath, values: Mapping[str, Any], layer: Layer) -> None:
-        """Merge the values of a later layer; `path` is that of the table. Tables are merged, lists replaced."""
-        self._add(self.values, path, values, layer)
+    def add(
+        self, path: KeyPath, values: Mapping[str, Any], layer: Layer, into: dict[str, Any] | None = None
+    ) -> None:
+        """Merge the values of a later layer. Tables are merged, lists replaced.
 
-    def _add(self, into: dict[str, Any], path: KeyPath, values: Mapping[str, Any], layer: Layer) -> None:
+        `path` is that of the table, and `into` the table where it is one within the values.
+        """
+        into = self.values if into is None else into
         self.owner[path] = layer
         for key, value in values.items():
             here = (*path, key)
@@ -168,7 +165,7 @@ class Merged:
                 inner = into.get(key)
                 if not isinstance(inner, dict):
                     inner = into[key] = {}
-                self._add(inner, here, value, layer)
+                self.add(here, value, layer, inner)
             else:
                 was_table = isinstance(into.get(key), dict)
                 into[key] = value
@@ -271,7 +268,7 @@ def option_layers(options: Sequence[str]) -> tuple[list[Layer], list[str]]:
             )
             continue
         values = _nested(parts, _toml_value(value))
-        layers.append(Layer(label="-o", values=values, typed=set_option(option), final=True))
+        layers.append(Layer(label="-o", values=values, typed=set_option(option)))
     return layers, complaints
 
 

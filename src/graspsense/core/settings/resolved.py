@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from typing import Any, Final, cast
 
-from attrs import fields, frozen
+from attrs import evolve, fields, frozen
 
 from graspsense.core.components.entries import TABLE_OF_ROLE, Role
 from graspsense.core.components.registry import Component, Plugins, installed
@@ -306,7 +306,7 @@ def _tables_only(layer: Layer, complaints: list[_Complaint]) -> Layer:
             )
         else:
             values[key] = value
-    return Layer(label=layer.label, values=values, lines=layer.lines, typed=layer.typed, final=layer.final)
+    return evolve(layer, values=values)
 
 
 def _component(
@@ -331,7 +331,7 @@ def _component(
     if table == "classifier" and name == NONE:
         for layer in users:
             for key in layer.values[table]:
-                if key != "type" and (layer.final or layer is setter):
+                if key != "type" and (layer.typed or layer is setter):
                     text = f'classifier.type is "{NONE}": choose one that has this key'
                     complaints.append(layer.complain(InvalidValue((table, key), text)))
         return None
@@ -353,7 +353,7 @@ def _merged(layers: Sequence[Layer], table: str, component: Component | None) ->
             continue
         named = values.get("type", named)
         other = component is not None and named not in (None, component.name, component.qualified)
-        if layer.final or not other:
+        if layer.typed or not other:
             merged.add((table,), values, layer)
     return merged
 

@@ -31,6 +31,18 @@ _LOOK_ALIKE: Final = str.maketrans(
 _ACCENTS: Final = re.compile("(?<=[a-z])[\u0300-\u036f]+")
 _QUOTES: Final = " .'`\"\u00ab\u00bb\u2018\u2019\u201a\u201c\u201d\u201e\u2039\u203a"
 _LAST_ZEROS: Final = re.compile(r"(?<!\d)(\d+\.\d*[1-9])0+(?![\d.])")
+_NUMBER: Final = re.compile(r"\d+")
+
+
+def natural_order(labels: Iterable[str]) -> list[str]:
+    """Return the different labels as a reader looks for them, with the numbers in them by size.
+
+    >>> natural_order(["can10", "can2", "can2", "box"])
+    ['box', 'can2', 'can10']
+    """
+    return sorted(
+        set(labels), key=lambda label: (_NUMBER.sub(lambda digits: digits[0].zfill(32), label), label)
+    )
 
 
 def label_text(text: str) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 from attrs import frozen
 
 from graspsense.core.components.channels import further
+from graspsense.core.values.label_text import natural_order
 from graspsense.core.values.signals import CHANNEL_OF_FIELD
 from graspsense.core.values.trace import SI_UNITS, ImageTrace, signals_of
 from graspsense.recording.labelled_recording import LabelledRecording
@@ -69,7 +70,7 @@ def summary_of(recordings: Sequence[LabelledRecording]) -> ImportSummary:
     times = sorted(recording.recorded_at for recording in recordings)
     return ImportSummary(
         grasps=len(recordings),
-        labels=tuple(_label(label, some) for label, some in sorted(by_label.items())),
+        labels=tuple(_label(label, by_label[label]) for label in natural_order(by_label)),
         units=dict(earliest.units),
         channels=tuple(f"{channel.name} [{channel.unit}]" for channel in further(earliest.channels)),
         values=tuple(dict.fromkeys(name for recording in recordings for name in recording.values)),
