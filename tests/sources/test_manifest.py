@@ -304,10 +304,15 @@ def test_a_gap_that_stops_for_a_squeeze_does_not_join_it_with_the_next(tmp_path)
 def test_one_of_several_squeezes_that_is_unlike_the_others_is_told(pads, gap_m, told, split, tmp_path):
     """A gain, or a zero of the gap, that is another one in the third of five squeezes; the others are not doubted."""
     gaps, force, time = repeated(1.0, 1.0, 1.0, 1.0, 1.0)
-    third = np.arange(len(time)) // 600 == 2
+    spoilt_rows = np.arange(len(time)) // 600 == 2
     noise = np.random.default_rng(7).normal(0.0, 0.05, (2, len(time)))
-    left, right = (np.where(third, gain, 1.0) * force for gain in pads)
-    columns = {"t": time, "gap": 1e3 * (gaps + gap_m * third), "L": left + noise[0], "R": right + noise[1]}
+    left, right = (np.where(spoilt_rows, gain, 1.0) * force for gain in pads)
+    columns = {
+        "t": time,
+        "gap": 1e3 * (gaps + gap_m * spoilt_rows),
+        "L": left + noise[0],
+        "R": right + noise[1],
+    }
     pandas_csv(tmp_path / "jar.csv", columns | {"trial": np.arange(len(time)) // 600})
     keys = 'time = "t"\ngap = "gap [mm]"\nleft = "L"\nright = "R"'
     squeezes = recordings(tmp_path, f'files = "{{label}}.csv"\nsplit = "{split}"\n{keys}')

@@ -300,11 +300,11 @@ def _numb(pad: _Force, other: _Force) -> Iterator[str]:
 
 def shares_under_load(left: Numbers, right: Numbers) -> Numbers:
     """Return the share of the force of both pads that the right one bears, in each sample under a load."""
-    one, other = (np.abs(pad - np.median(pad[:ZERO_SAMPLES])) for pad in (left, right))
-    both = one + other
+    of_left, of_right = (np.abs(pad - np.median(pad[:ZERO_SAMPLES])) for pad in (left, right))
+    both = of_left + of_right
     low, high = usual_range(both)
     loaded = both > low + LOADED * (high - low)
-    shares: Numbers = other[loaded] / both[loaded]
+    shares: Numbers = of_right[loaded] / both[loaded]
     return shares
 
 
