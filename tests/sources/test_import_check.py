@@ -156,6 +156,28 @@ def test_the_cells_of_sensors_are_forces_whatever_their_names(names: str, tmp_pa
         assert np.corrcoef(felt, force)[0, 1] > 0.99
 
 
+@every_case(
+    ("head", "recorded", "label"),
+    [
+        ("# date: 2026-05-03 14:22:01\n# object: jar\n", "{date}", "jar"),
+        ("# Date: 2026-05-03\n# Time: 14:22:01\n", "{date} {time}", "object"),
+        ('"Started"\t"2026-05-03T14:22:01"\n\n', "{started}", "object"),
+        ("# rate: 100 Hz\n# operator = Ada\n", None, "object"),
+    ],
+)
+def test_what_lines_before_a_table_say_can_be_used_and_is_suggested(
+    head: str, recorded: str | None, label: str, tmp_path: Path
+) -> None:
+    for k in (1, 2):
+        place = tmp_path / f"r_{k}.csv"
+        table(place, TABLE)
+        place.write_text(head + (place.read_text().replace(",", "\t") if "\t" in head else place.read_text()))
+    printed("import", tmp_path, "--suggest", tmp_path / "m.toml")
+    assert tomllib.loads((tmp_path / "m.toml").read_text()).get("recorded") == recorded
+    for grasp in read_recordings(str(tmp_path / "m.toml")):
+        assert (grasp.label, grasp.recorded_at[:19]) == (label, "2026-05-03T14:22:01" if recorded else "")
+
+
 def test_what_the_file_states_is_not_questioned(tmp_path):
     for name in ("jar_1", "jar_2", "can_1"):
         table(

@@ -289,6 +289,40 @@ def test_a_gap_that_stops_for_a_squeeze_does_not_join_it_with_the_next(tmp_path)
     assert [bool(squeeze.notices) for squeeze in squeezes] == [False, False, True, False]
 
 
+@every_case(
+    ("pads", "gap_m", "told"),
+    [
+        ((1.0, 1.0), 0.0, None),
+        # Noise and forces that differ by a tenth are no fault.
+        ((1.1, 1.1), 0.0, None),
+        ((0.4, 0.4), 0.0, "the force is another one at the same gap"),
+        ((0.6, 1.0), 0.0, "the right pad bears another share"),
+        ((1.0, 1.0), 0.004, "the fingers open to another gap"),
+    ],
+)
+@every_case("split", ["force", "trial"])
+def test_one_of_several_squeezes_that_is_unlike_the_others_is_told(pads, gap_m, told, split, tmp_path):
+    """A gain, or a zero of the gap, that is another one in the third of five squeezes; the others are not doubted."""
+    gaps, force, time = repeated(1.0, 1.0, 1.0, 1.0, 1.0)
+    spoilt_rows = np.arange(len(time)) // 600 == 2
+    noise = np.random.default_rng(7).normal(0.0, 0.05, (2, len(time)))
+    left, right = (np.where(spoilt_rows, gain, 1.0) * force for gain in pads)
+    columns = {
+        "t": time,
+        "gap": 1e3 * (gaps + gap_m * spoilt_rows),
+        "L": left + noise[0],
+        "R": right + noise[1],
+    }
+    pandas_csv(tmp_path / "jar.csv", columns | {"trial": np.arange(len(time)) // 600})
+    keys = 'time = "t"\ngap = "gap [mm]"\nleft = "L"\nright = "R"'
+    squeezes = recordings(tmp_path, f'files = "{{label}}.csv"\nsplit = "{split}"\n{keys}')
+    notices = ["; ".join(squeeze.notices) for squeeze in squeezes]
+    assert len(squeezes) == 5
+    unlike = ["than in most grasps" in notice for notice in notices]
+    assert unlike == [False, False, told is not None, False, False], notices
+    assert told is None or told in notices[2]
+
+
 def test_a_force_that_drops_out_while_the_gap_stays_is_told(tmp_path):
     """For 0.3 s of a hold of 0.5 s; between squeezes the fingers open."""
     gaps, forces, time = repeated(1.0, 1.0, hold=50)

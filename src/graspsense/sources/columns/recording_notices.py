@@ -298,17 +298,24 @@ def _numb(pad: _Force, other: _Force) -> Iterator[str]:
         )
 
 
+def shares_under_load(left: Numbers, right: Numbers) -> Numbers:
+    """Return the share of the force of both pads that the right one bears, in each sample under a load."""
+    of_left, of_right = (np.abs(pad - np.median(pad[:ZERO_SAMPLES])) for pad in (left, right))
+    both = of_left + of_right
+    low, high = usual_range(both)
+    loaded = both > low + LOADED * (high - low)
+    shares: Numbers = of_right[loaded] / both[loaded]
+    return shares
+
+
 def _unequal(left: _Force, right: _Force) -> Iterator[str]:
     """Yield that two pads do not bear the same force, or not all the time: as opposed pads they have to.
 
     Counts of two sensors need not be the same, but what they are of each other stays.
     """
-    magnitudes = [np.abs(pad.n - np.median(pad.n[:ZERO_SAMPLES])) for pad in (left, right)]
-    both = evolve(left, n=magnitudes[0] + magnitudes[1])
-    loaded = both.above(LOADED)
-    if np.count_nonzero(loaded) < FEWEST or not any(pad.span > pad.noise for pad in (left, right)):
+    shares = shares_under_load(left.n, right.n)
+    if len(shares) < FEWEST or not any(pad.span > pad.noise for pad in (left, right)):
         return
-    shares = magnitudes[1][loaded] / both.n[loaded]
     least, usual, most = np.quantile(shares, (PART, 0.5, 1.0 - PART))  # a pad can touch first or let go last
     if most - least > UNEQUAL or (abs(usual - 0.5) > UNEQUAL and "force_left" not in left.units):
         yield (

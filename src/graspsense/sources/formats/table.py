@@ -50,6 +50,8 @@ class ColumnTable:
     channel."""
     texts: Mapping[str, Sequence[str]] = field(factory=dict)
     fields: Mapping[str, str] = field(factory=dict)
+    about: Mapping[str, str] = field(factory=dict)
+    """What lines before the table say (`# date: 2026-05-03`), used where nothing else has a name of a manifest."""
     blank: frozenset[str] = frozenset()
     """The names of fields that are empty for this part in a list."""
     t_s: Numbers | None = None
@@ -77,7 +79,7 @@ class ColumnTable:
         return 0
 
     def value(self, name: str) -> str | None:
-        """Return the only value of a field or of a column as text, None if there is neither.
+        """Return the only value of a field or of a column as text, or what the file says; None if there is neither.
 
         Raises DataDamaged if the column has several values.
         """
@@ -88,7 +90,7 @@ class ColumnTable:
         elif name in self.numbers and self.numbers[name].ndim == 1:
             values = {_shown(float(number)) for number in np.unique(self.numbers[name])}
         else:
-            return None
+            return self.about.get(name)
         if len(values) != 1:
             some = ", ".join(sorted(values)[:4])
             raise DataDamaged(

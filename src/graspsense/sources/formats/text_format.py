@@ -8,8 +8,10 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Final
 
 import numpy as np
+from attrs import evolve
 
 from graspsense.core.values.errors import DataDamaged
 from graspsense.core.values.label_text import is_missing_label
@@ -38,6 +40,13 @@ from graspsense.sources.formats.text_table import (
 
 _Part = tuple[dict[str, str], Sequence[Line]]
 
+_FACT: Final = re.compile(
+    r"""[#%"\s]*(?P<name>[^\W\d][\w .-]*?)"?\s*(?:[:=]\s*"?(?P<said>[^"]+?)|[;,\t]\s*"?(?P<cell>[^;,\t"]+))["\s;,]*"""
+)
+"""A line before a table that says something: `# date: 2026-05-03`, `Operator;Ada`."""
+_LONGEST_FACT: Final = 300
+"""Characters of such a line, so that its expression cannot take long."""
+
 
 def read_text(path: Path, start: str = "") -> list[ColumnTable]:
     """Return the tables in a text file: one, or with `start` one for each line that this regular expression matches.
@@ -65,12 +74,26 @@ def _part_table(path: Path, part: _Part, *, ended: bool, several: bool) -> Colum
     fields, lines = part
     try:
         table = table_of(path, lines, ended=ended)
-        return _columns(path, fields, table, several=several) if table.names else None
+        if not table.names:
+            return None
+        about = _said_before(lines, table)
+        return evolve(_columns(path, fields, table, several=several), about=about)
     except DataDamaged as error:
         if not several:
             raise
         where = f", line {lines[0][0]}" if lines else ""
         return ColumnTable(source=f"{path.name}{where}", fields=fields, damage=str(error))
+
+
+def _said_before(lines: Sequence[Line], table: TextTable) -> dict[str, str]:
+    """Return what the lines before a table say, by the names that fields can have."""
+    begin = table.named_in or min(table.lines, default=0)
+    short = [line for number, line in lines if number < begin and len(line) < _LONGEST_FACT]
+    facts = [match for line in short if (match := _FACT.fullmatch(line))]
+    return {
+        re.sub(r"\W+", "_", fact["name"].lower()).strip("_"): (fact["said"] or fact["cell"]).strip()
+        for fact in facts
+    }
 
 
 def _parts(lines: Sequence[Line], start: str) -> Iterator[_Part]:

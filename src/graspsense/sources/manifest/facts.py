@@ -33,7 +33,7 @@ def filled(manifest: ReadManifest, key: str, template: str, table: ColumnTable) 
     def value(match: re.Match[str]) -> str:
         text = table.value(match[1])
         if text is None:
-            known = listed((*table.fields, *table.texts, *table.numbers))
+            known = listed((*table.fields, *table.texts, *table.numbers, *table.about))
             raise ConfigError(
                 f"{manifest.place}: {key}: {table.source} has no field or column {match[1]!r}. It has: {known}"
             )
@@ -75,21 +75,25 @@ def recorded_at_of(manifest: ReadManifest, table: ColumnTable) -> str:
     text = _given(manifest, "recorded", table)
     if not text:
         return ""
-    stamp = _STAMP.fullmatch(text.removesuffix("Z"))
-    number = number_in(text)
     try:
-        if stamp is not None:
-            return datetime(*(int(group) for group in stamp.groups()), tzinfo=UTC).isoformat()  # type: ignore[misc, arg-type]
-        if number is not None:
-            while number > 1e11:  # milliseconds, microseconds or nanoseconds
-                number /= 1e3
-            return datetime.fromtimestamp(number, UTC).isoformat()
-        return datetime.fromisoformat(text).isoformat()
+        return iso_time(text)
     except (ValueError, OverflowError, OSError):
         raise ConfigError(
             f"{manifest.place}: recorded: {text!r} of {table.source} is not a time: write 2024-11-24T15:13:19, "
             "20241124_151319, or seconds since 1970"
         ) from None
+
+
+def iso_time(text: str) -> str:
+    """Return a time in ISO 8601. Raises ValueError, OverflowError or OSError for a text that is none."""
+    stamp, number = _STAMP.fullmatch(text.removesuffix("Z")), number_in(text)
+    if stamp is not None:
+        return datetime(*(int(group) for group in stamp.groups()), tzinfo=UTC).isoformat()  # type: ignore[misc, arg-type]
+    if number is not None:
+        while number > 1e11:  # milliseconds, microseconds or nanoseconds
+            number /= 1e3
+        return datetime.fromtimestamp(number, UTC).isoformat()
+    return datetime.fromisoformat(text).isoformat()
 
 
 @np.errstate(all="ignore")  # of infinite values

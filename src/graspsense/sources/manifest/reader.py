@@ -24,6 +24,7 @@ from graspsense.sources.columns.grasp_columns import GraspColumns, checked_recor
 from graspsense.sources.formats.raw_tables import raw_tables
 from graspsense.sources.formats.table import ColumnTable, Numbers, TableRules
 from graspsense.sources.formats.topic_clocks import Messages, common_clock
+from graspsense.sources.manifest.alike import compared
 from graspsense.sources.manifest.description import ReadManifest, axes_of, read_manifest, texts_of
 from graspsense.sources.manifest.facts import (
     FIELD,
@@ -47,14 +48,22 @@ def read_recordings(place: str) -> Iterator[LabelledRecording | UnreadableRecord
     Raises ConfigError if the manifest itself cannot be used.
     """
     manifest = read_manifest(Path(os.path.expanduser(place)))
-    told = tuple(left_out(manifest))
+    told = list(left_out(manifest))
     for file in files_of(manifest):
-        for table in each_readable(file.name, partial(tables_of, manifest, file)):
-            if isinstance(table, UnreadableRecording):
-                yield table
-                continue
-            named, told = evolve(table, warnings=(*table.warnings, *told)), ()
-            yield from each_readable(table.source, partial(grasps_in, manifest, file, named))
+        yield from compared(list(_recordings_of(manifest, file, told)))
+
+
+def _recordings_of(
+    manifest: ReadManifest, file: NamedFile, told: list[str]
+) -> Iterator[LabelledRecording | UnreadableRecording]:
+    """Yield every grasp of a file; the first table takes what is to be `told` of the files."""
+    for table in each_readable(file.name, partial(tables_of, manifest, file)):
+        if isinstance(table, UnreadableRecording):
+            yield table
+            continue
+        named = evolve(table, warnings=(*table.warnings, *told))
+        told.clear()
+        yield from each_readable(table.source, partial(grasps_in, manifest, file, named))
 
 
 def manifest_files(place: str) -> list[Path]:

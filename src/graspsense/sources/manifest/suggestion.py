@@ -9,8 +9,9 @@ import json
 import os
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from itertools import pairwise
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from itertools import pairwise, permutations
 from pathlib import Path
 from typing import Final
 
@@ -26,6 +27,7 @@ from graspsense.sources.formats.array_format import ARRAY_SUFFIXES, COLUMN, GRAS
 from graspsense.sources.formats.raw_tables import READ_SUFFIXES, TEXT_SUFFIXES, raw_tables
 from graspsense.sources.formats.table import ColumnTable, TableRules
 from graspsense.sources.formats.text_table import read_lines, text_suffix
+from graspsense.sources.manifest.facts import iso_time
 from graspsense.sources.manifest.files import tree_below
 
 _DOCUMENTS: Final = frozenset({"readme", "license", "licence", "requirements", "changelog", "citation"})
@@ -40,6 +42,7 @@ _PARTS: Final = frozenset({
     "trial", "grasp", "tap", "squeeze", "episode", "run", "id", "seq", "test", "touch", "press", "repetition",
     "rep"
 })  # fmt: skip
+_TIMES: Final = re.compile("stamp|date|time|start|begin|record")
 _MOST_LABELS: Final = 100
 _ALIKE: Final = 3
 """Most arrays of a file with the same name but for its number that are not taken for grasps."""
@@ -275,21 +278,32 @@ def _label(fields: set[str], table: ColumnTable, divided: Sequence[str]) -> Iter
         return
     stamps = [name for name in sorted(fields) if re.search("stamp|date", name)]
     stamp = next((name for name in stamps if re.search("start|begin", name)), next(iter(stamps), None))
-    if stamp is not None:
-        yield Guess(key="recorded", value=f"{{{stamp}}}", check="whether it is the time of recording")
+    recorded = _time_said(table.about) if stamp is None else f"{{{stamp}}}"
+    if recorded:
+        yield Guess(key="recorded", value=recorded, check="whether it is the time of recording")
     if "order" not in fields and "seq" in fields:
         yield Guess(key="order", value="{seq}", check="whether seq is the order of recording")
     if "label" in fields:
         return
-    known = (*sorted(fields), *table.texts, *table.fields)
+    known = (*sorted(fields), *table.texts, *table.fields, *table.about)
     named = [name for name in known if _LABELS & set(re.findall("[a-z]+", name.lower()))]
     texts = [name for name, cells in table.texts.items() if len(set(cells)) <= _MOST_LABELS]
     name = next(iter((*named, *texts)), None)
     if name is None:
         yield Guess(key="label", value="object", check="nothing names the object: write what was grasped")
     else:
-        label = f"{{{name}}}" if name in table.texts else f"object{{{name}}}"
+        label = f"{{{name}}}" if name in (*table.texts, *table.about) else f"object{{{name}}}"
         yield Guess(key="label", value=label, check=f"whether {name} is what was grasped")
+
+
+def _time_said(about: Mapping[str, str]) -> str:
+    """Return the time that the lines before a table say, also in two of them; empty if they say none."""
+    named = [name for name, text in about.items() if _TIMES.search(name) and not is_number(text)]
+    for names in (*permutations(named, 2), *((name,) for name in named)):
+        with suppress(ValueError):
+            iso_time(" ".join(about[name] for name in names))
+            return " ".join(f"{{{name}}}" for name in names)
+    return ""
 
 
 def _label_of_rows(table: ColumnTable) -> Iterator[Guess]:
