@@ -22,6 +22,8 @@ from graspsense.sources.formats.table import Numbers
 
 GRASPS: Final = 4
 """Fewest grasps of a file that are compared."""
+MOST_COMPARED: Final = 100
+"""Most grasps of a file that are compared with each other, and in memory at once."""
 APART: Final = 4.0
 """Two groups of grasps are apart by so many times what those of each differ,"""
 OPENING: Final = 0.05

@@ -7,6 +7,7 @@ import math
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +25,7 @@ from graspsense.sources.columns.grasp_columns import GraspColumns, checked_recor
 from graspsense.sources.formats.raw_tables import raw_tables
 from graspsense.sources.formats.table import ColumnTable, Numbers, TableRules
 from graspsense.sources.formats.topic_clocks import Messages, common_clock
-from graspsense.sources.manifest.alike import compared
+from graspsense.sources.manifest.alike import MOST_COMPARED, compared
 from graspsense.sources.manifest.description import ReadManifest, axes_of, read_manifest, texts_of
 from graspsense.sources.manifest.facts import (
     FIELD,
@@ -50,7 +51,9 @@ def read_recordings(place: str) -> Iterator[LabelledRecording | UnreadableRecord
     manifest = read_manifest(Path(os.path.expanduser(place)))
     told = list(left_out(manifest))
     for file in files_of(manifest):
-        yield from compared(list(_recordings_of(manifest, file, told)))
+        grasps = _recordings_of(manifest, file, told)
+        while together := list(islice(grasps, MOST_COMPARED)):
+            yield from compared(together)
 
 
 def _recordings_of(
