@@ -216,7 +216,9 @@ class CommandedInVelocity(Scripted):
 
 
 def test_a_dry_run_shows_what_a_gripper_commanded_in_velocity_is_commanded():
-    settings = resolve(options=["controller.type=velocity", "controller.sends=velocity"])
+    # The fingers of `squeezing` close at 20 mm/s, whatever they are told: far more than that would end the approach.
+    speed = "run.first_speed_m_s=0.015"
+    settings = resolve(options=["controller.type=velocity", "controller.sends=velocity", speed])
     gripper = CommandedInVelocity(squeezing, bottle, clock="device")
     rehearsed = dry_run(gripper, settings.controller.create(), settings.run)
     phases = {phase.phase: phase for phase in rehearsed.phases}

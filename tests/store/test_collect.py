@@ -251,7 +251,7 @@ TOY = (("--object", "toy"), ("-o", "gripper.object=toy"))
         # An object that the gripper does not know, and one that contradicts the label.
         ("block,nonsense:full", (), "named 'nonsense'"),
         *((f"block,{label}", (), "object 'can'") for label in ("can", "can:full_opn")),
-        *(("block", (*gripper, *toy), "the label block is not what the gripper holds, which is toy")
+        *(("block", (*gripper, *toy), "the object toy")
           for gripper in ((), EMULATED) for toy in TOY),
     ],
 )  # fmt: skip
