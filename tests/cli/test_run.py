@@ -216,10 +216,9 @@ class CommandedInVelocity(Scripted):
 
 
 def test_a_dry_run_shows_what_a_gripper_commanded_in_velocity_is_commanded():
-    # The fingers of `squeezing` close at 20 mm/s, whatever they are told: far more than that would end the approach.
-    speed = "run.first_speed_m_s=0.015"
-    settings = resolve(options=["controller.type=velocity", "controller.sends=velocity", speed])
-    gripper = CommandedInVelocity(squeezing, bottle, clock="device")
+    settings = resolve(options=["controller.type=velocity", "controller.sends=velocity"])
+    # Told to close at 10 mm/s, these fingers do so at 16: twice as fast would end the approach.
+    gripper = CommandedInVelocity(lambda t: squeezing(0.8 * t), lambda t: bottle(0.8 * t), clock="device")
     rehearsed = dry_run(gripper, settings.controller.create(), settings.run)
     phases = {phase.phase: phase for phase in rehearsed.phases}
 

@@ -96,12 +96,11 @@ def read_labelled(
         instance = _object_column(columns, {label, order, columns.index, *features}, identified, notes)
     instances = None if instance is None else tuple(columns.complete_column(instance, "the instance"))
     reserved = {name for name in (label, instance, order, value) if name}
-    if export is None and order is None:
-        notes.append(_no_order(columns, reserved, identified))
     table = _feature_table(columns, features, export.features if export else [], reserved, identified, notes)
     others = [name for name in columns.names if name not in {*reserved, *table.names}]
     if export is None:
         recorded = lines if ranks is None else sorted(lines, key=ranks.__getitem__)
+        notes += [] if order is not None else [_no_order(columns, reserved, identified)]
         notes += doubts(columns, labels, table, target, recorded)
         notes += map(_not_held_out, _sessions(columns, others, instances))
     return Labelled(
