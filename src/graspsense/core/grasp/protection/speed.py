@@ -45,7 +45,8 @@ FEW_JUMPS: Final = 4
 FAST: Final = 1.5
 """Speed over the commanded one from which on the fingers are too fast; its inverse is too slow."""
 FAST_ENDS: Final = 2.0
-"""Speed over the commanded one that ends an approach: the fingers meet the object with four times the energy."""
+"""Speed over the commanded one that ends an approach, beyond the limit of a first use: the fingers meet the object with
+four times the energy."""
 FAST_S: Final = 0.2
 """Time over which a speed that is too fast is taken; at least three frames."""
 BLOCK_S: Final = 0.3
@@ -240,7 +241,7 @@ class KeptSpeed:
         )
         self._too_fast_s = self._too_fast_s + frame.dt_s if too_fast else 0.0
         if self._too_fast_s > LASTS_S:
-            return self._not_kept(speed_m_s, ends=speed_m_s > FAST_ENDS * abs(told_m_s))
+            return self._not_kept(speed_m_s, ends=speed_m_s > max(FAST_ENDS * abs(told_m_s), self._limit_m_s))
         return self._slow(frame) if phase == APPROACH and told_m_s > 0.0 and not self._kept else None
 
     def _slow(self, frame: Frame) -> Fault | None:
