@@ -1,6 +1,7 @@
 """Trials that belong together without an instance that says so are held out together, and the certainty shows it."""
 
 import numpy as np
+import pytest
 from attrs import evolve
 from cases import every_case
 from test_conformal import model_of
@@ -123,6 +124,7 @@ def test_stretches_of_a_label_that_are_alike_as_after_a_new_mounting_are_held_ou
     assert told["as before"] == 0
 
 
+@pytest.mark.slow
 def test_windows_and_grasps_of_unnamed_objects_in_any_order_are_held_out_together_and_other_trials_are_not():
     told = {"windows": 0, "objects": 0, "objects with uneven trials": 0, "single": 0, "inside and outside": 0}
     for seed in range(10):
@@ -147,6 +149,7 @@ def test_windows_and_grasps_of_unnamed_objects_in_any_order_are_held_out_togethe
     assert told["single"] == told["inside and outside"] == 0
 
 
+@pytest.mark.slow
 def test_noisy_copies_of_every_trial_in_any_order_are_in_groups_of_about_as_many():
     groups, whole = [], []
     for seed in range(10):

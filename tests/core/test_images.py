@@ -373,6 +373,7 @@ def test_a_law_for_cells_of_another_type_does_not_fit(seen):
         wiring.check(load_pipeline(options=options, plugins=plugins).settings)
 
 
+@pytest.mark.slow
 def test_the_state_of_a_law_holds_images_that_nobody_changes(seen, monkeypatch):
     _, _, plugins = seen
     (law,) = (component for component in plugins.components("controller") if component.name == "watching")

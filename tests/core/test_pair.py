@@ -85,6 +85,7 @@ def test_a_grasp_of_a_pair_is_the_grasp_alone():
     assert any("beside scripted" in note for note in left.device.notes)
 
 
+@pytest.mark.slow
 @every_case(("lost", "place"), [("lose_at", 0), ("silent_from", 1)])
 def test_both_let_go_if_one_is_lost(lost, place):
     sound, broken = Scripted(squeezing, bottle), Scripted(squeezing, bottle, **{lost: 1300})

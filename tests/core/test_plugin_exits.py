@@ -32,6 +32,7 @@ def released(gripper):
     return gripper.closed == 1 and gripper.commands[-1].value == 0.0
 
 
+@pytest.mark.slow
 @every_case("error", [SystemExit(0), OSError("Input/output error"), CancelledError("the loop has ended")])
 @every_case("method", ["read", "apply", "tare", "close", "report"])
 def test_a_gripper_that_ends_the_program_or_fails_ends_the_grasp_and_keeps_the_trace(method, error):

@@ -136,6 +136,7 @@ def let_go(gripper):
     return values[-1] == 0.0 and -20.0 in values[-110:]
 
 
+@pytest.mark.slow
 @every_case("tick", [0, 1, 50, 200, 600, 1200, 1600, 1850])
 def test_a_device_lost_in_any_phase_is_an_outcome_with_the_trace_to_the_last_frame(tick):
     gripper = Scripted(squeezing, bottle, lose_at=tick)
@@ -302,6 +303,7 @@ def test_a_recording_ends_as_what_it_showed(length, outcome):
     assert run_grasp(Recorded(squeezing, bottle, length), HYBRID, RUN).outcome is outcome
 
 
+@pytest.mark.slow
 def test_late_frames_are_counted_on_a_device_clock_only():
     def late(late_s, clock):
         jerky = Changed(

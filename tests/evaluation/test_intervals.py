@@ -142,6 +142,7 @@ def test_instances_that_agree_give_no_interval_narrower_than_their_trials(counts
     assert 0.0 <= low <= below <= above <= high <= 1.0
 
 
+@pytest.mark.slow
 def test_the_interval_of_a_cross_validated_rate_covers_the_rate_of_such_trials():
     measured = interval_coverage.evaluated(12, 60)
     assert measured["graspsense"] >= 0.9

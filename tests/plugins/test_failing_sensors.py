@@ -2,6 +2,7 @@
 
 from math import nan
 
+import pytest
 from cases import every_case
 
 from graspsense import load_pipeline
@@ -47,6 +48,7 @@ def half_the_time(frame, start):
     return {"t_s": start.t_s + 0.5 * (frame.t_s - start.t_s), "dt_s": 0.5 * frame.dt_s}
 
 
+@pytest.mark.slow
 @every_case(
     ("pipelines", "fault", "from_s", "names"),
     [

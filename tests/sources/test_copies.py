@@ -265,6 +265,7 @@ def test_copies_with_other_digits_are_said(change):
     assert any("another trial" in note for note in kept.notes)
 
 
+@pytest.mark.slow
 @given(seed=st.integers(0, 10_000), features=st.integers(2, 5))
 def test_measured_trials_are_not_taken_for_near_copies(seed, features):
     rng = np.random.default_rng(seed)

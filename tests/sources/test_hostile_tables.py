@@ -337,6 +337,7 @@ def test_too_many_samples_or_grasps_or_no_force_are_refused_for_the_recording(tm
     assert says in str(recording.error)
 
 
+@pytest.mark.slow
 @every_case(
     "text",
     [

@@ -363,6 +363,7 @@ def test_pads_that_disagree_in_some_trials_are_told(dead, tmp_path):
     assert not pads_told(rng.normal(0.0, 1.0, N))
 
 
+@pytest.mark.slow
 @given(seed=st.integers(0, 10_000))
 def test_measured_columns_are_not_doubted(tmp_path_factory, seed):
     rng = np.random.default_rng(seed)

@@ -132,6 +132,7 @@ CELLS = {
 }
 
 
+@pytest.mark.slow
 @every_case("names", CELLS)
 def test_the_cells_of_sensors_are_forces_whatever_their_names(names: str, tmp_path: Path) -> None:
     """Not those that move before the fingers touch, such as the joints of an arm."""

@@ -240,6 +240,7 @@ F0, F1 = (np.round(1000 + counts * FORCE_N) for counts in (10, 9))
 BEGAN = "2020-06-15T15:11:27.442126+00:00"
 
 
+@pytest.mark.slow
 @every_case(
     ("write", "number", "position", "facts", "left_n", "right_n"),
     [

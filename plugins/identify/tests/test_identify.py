@@ -120,6 +120,7 @@ def with_right_pad(share, noise_n=0.0):
     return evolve(recorded(), trace=evolve(recorded().trace, **pads))
 
 
+@pytest.mark.slow
 def test_recordings_whose_pads_differ_are_left_out_and_a_scene_of_only_such_ones_is_refused():
     config, notes = SimConfig(sensor="ideal", pad_stiffness_n_m=float("inf")), []
     alike, apart = recorded(), with_right_pad(0.5)
@@ -141,6 +142,7 @@ def test_recordings_whose_pads_differ_are_left_out_and_a_scene_of_only_such_ones
     assert what_is_not_determined(with_right_pad(1.0, noise_n=0.8)) == set()
 
 
+@pytest.mark.slow
 @every_case(
     ("stiffnesses", "scale", "told"),
     [

@@ -122,6 +122,7 @@ def driven(driver, command, ticks):
     return frames
 
 
+@pytest.mark.slow
 @every_case("at_s", [0.22, 0.7, 2.2])
 @every_case("fault", ["unplug", "silent"])
 def test_a_gripper_lost_in_a_grasp_ends_it_and_is_told(fault, at_s):

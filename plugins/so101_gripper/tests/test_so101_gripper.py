@@ -128,6 +128,7 @@ def test_it_closes_with_the_torque_limit_of_the_force_and_tells_load_current_and
     assert 0.005 < frame.gap_m < 0.08
 
 
+@pytest.mark.slow
 @every_case("at_s", [0.02, 0.5, 2.0])
 @every_case("fault", ["unplug", "silent"])
 def test_a_gripper_lost_in_a_grasp_ends_it_and_is_told(fault, at_s):
