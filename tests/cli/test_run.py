@@ -196,7 +196,9 @@ def test_a_label_and_the_object_of_a_simulated_gripper_agree(tmp_path):
     printed(*plain, "--label", "can:full_open")
     with Store.read(store) as opened:
         assert opened.trial(1).record.settings["gripper"]["object"] == "can:full_open"
-    assert "contradicts the object" in refused(*plain, "--label", "can:full_open", "--object", "can:empty_open")
+    assert "contradicts the object" in refused(
+        *plain, "--label", "can:full_open", "--object", "can:empty_open"
+    )
     with Store.read(store) as opened:
         assert len(opened.page()) == 1
 

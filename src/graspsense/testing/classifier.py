@@ -129,14 +129,18 @@ def _shares(fitted: Any, table: FeatureTable, trained: str = "", advice: str = "
 
 
 def separates_separable_trials(subject: Subject) -> None:
-    """Most separable training trials are predicted correctly, of two labels, a few or many, by large or small numbers."""
+    """Most separable training trials are predicted right, of two or many labels, by large or small numbers."""
     table, labels = sample_table()
     small = FeatureTable(names=("compliance",), units=("m/N",), values=COMPLIANCE * table.values[:, 2:3])
     two = np.array([i for i, label in enumerate(labels) if label.startswith("bottle")])
     for trials, given, least, advice in (
         (table, labels, LEAST_RIGHT, "is the order of `classes` that of the columns?"),
         (table.rows(two), [labels[i] for i in two], LEAST_RIGHT, "give both of two labels their own column"),
-        (*_many(), LEAST_RIGHT_OF_SOME, "learn from all features, with their signs, and give each label its column"),
+        (
+            *_many(),
+            LEAST_RIGHT_OF_SOME,
+            "learn from all features, with their signs, and give each label its column",
+        ),
         (
             small,
             labels,
