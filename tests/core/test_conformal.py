@@ -464,6 +464,7 @@ def squeezed_in(sessions, each, rng, means):
     return labels, np.concatenate(forces).T, tuple(names)
 
 
+@pytest.mark.slow
 @every_case(
     ("sessions", "each", "held_out", "too_sure"),
     [(1, 40, False, True), (10, 6, False, False), (10, 6, True, False)],

@@ -207,6 +207,7 @@ def test_grasps_that_do_not_resemble_their_neighbours_are_no_groups(each):
         assert grouped(trials, NO_COPIES) is trials, f"seed {seed}"
 
 
+@pytest.mark.slow
 @every_case("make", [by_object, windows, pasted])
 def test_what_is_said_of_new_objects_is_not_too_sure(make):
     too_sure = []

@@ -206,6 +206,7 @@ def spin(*values):
         pass
 
 
+@pytest.mark.slow
 @every_case("hangs", [lambda *values: Event().wait(), spin])
 @every_case("after", [900, 1100])
 def test_a_step_that_never_ends_is_ended_and_the_fingers_are_opened(monkeypatch, hangs, after):

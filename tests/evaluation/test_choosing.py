@@ -129,6 +129,7 @@ def test_the_rate_of_labels_without_information_is_that_of_guessing():
     assert best > high
 
 
+@pytest.mark.slow
 def test_the_certainty_of_a_chosen_model_is_not_raised_by_the_choice():
     """Among features that tell nothing, the chosen one had the most luck: its own held-out answers are too good."""
     rng = np.random.default_rng(7)

@@ -70,6 +70,7 @@ def test_recordings(tmp_path):
     assert told > 0.8 * NUMBER
 
 
+@pytest.mark.slow
 def test_stores(tmp_path):
     """A store that opens is one in which `verify` finds what was changed, or nothing that matters was."""
     folder = tmp_path / "trials"

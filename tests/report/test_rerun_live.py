@@ -60,6 +60,7 @@ def check_complete(columns, n=20):
     assert columns["/grasp/events"][1][-1] == "outcome: steady"
 
 
+@pytest.mark.slow
 def test_the_reader_of_rerun_finds_what_was_logged(tmp_path):
     path = tmp_path / "grasp.rrd"
     feed = LiveFeed(RERUN, [str(path)])

@@ -340,6 +340,7 @@ def test_a_clock_that_begins_anew_between_two_squeezes_costs_neither_and_noise_i
         squeezes_of(tmp_path, np.random.default_rng(3).normal(0.0, 0.02, len(time)), gaps, time)
 
 
+@pytest.mark.slow
 @every_case("turned", [lambda f: -f, lambda f: -f - 1.0, lambda f: 20.0 - f, lambda f: 999.0 - 40.0 * f])
 def test_a_force_that_falls_on_closing_is_not_divided_into_squeezes_of_free_fingers(tmp_path, turned):
     gaps, force, time = repeated(1.0, 1.0, 1.0)

@@ -261,6 +261,7 @@ def test_fingers_that_do_not_move_end_the_grasp():
     assert trial.trace.t_s[-1] < 5.0
 
 
+@pytest.mark.slow
 def test_a_gripper_whose_program_is_killed_opens(emulated):
     gripper = emulated()
     settings = {"port": gripper.where, "reply_timeout_s": 10.0, "told": "reading.frame.gap_m < 0.075"}

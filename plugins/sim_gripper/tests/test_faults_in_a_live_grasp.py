@@ -2,6 +2,7 @@
 
 from math import inf
 
+import pytest
 from attrs import evolve
 from cases import every_case
 from grippers import settings_with
@@ -29,6 +30,7 @@ class LiveFingers(SimBackend):
         return reading._replace(frame=reading.frame._replace(force_left_n=left_n))
 
 
+@pytest.mark.slow
 @every_case(
     ("scale", "lost_s", "warned", "certain"),
     [(1.0, inf, (), True), (0.5, inf, ("pads disagree",), False), (1.0, 3.6, (), False)],
