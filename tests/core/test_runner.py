@@ -569,3 +569,22 @@ def test_an_effort_limit_above_the_ceiling_counts_and_is_told():
     assert "run.effort_ceiling_n" in told
     assert "25.0 N" in told
     assert grasp.counts["guarded"] >= (grasp.trace.phase == Phase.SQUEEZE).sum()
+
+
+class Deaf(Scripted):
+    """Its fingers do not hear the first 700 commands that open them."""
+
+    unheard = 700
+
+    def apply(self, command):
+        self.unheard -= self.closes and command.value < 0.0
+        if not 0 <= self.unheard < 700:
+            super().apply(command)
+
+
+@pytest.mark.slow
+def test_fingers_that_a_release_has_not_opened_are_told_again():
+    gripper = Deaf(squeezing, bottle)
+    grasp = run_grasp(gripper, HYBRID, RUN)
+    assert gripper.opens_from_s < gripper.k * 0.001
+    assert (grasp.outcome, grasp.reason) == (Outcome.STEADY, "")

@@ -16,15 +16,14 @@ from graspsense.plugin_api import (
     EFFORT,
     POSITION,
     Command,
-    Controller,
     Frame,
     Reading,
     setting,
 )
 from graspsense.plugins.controllers.supervision import (
     EVENTS,
-    LAW_CHANNELS,
     LawState,
+    SupervisedController,
     SupervisionConfig,
     events_of,
     free_end,
@@ -138,11 +137,9 @@ def free_command(
     return params.probing_force_n, params.probing_force_n
 
 
-class ForceController(Controller[ForceConfig]):
+class ForceController(SupervisedController[ForceConfig]):
     """Closes with a constant effort, or squeezes to a given force."""
 
-    requires = LAW_CHANNELS
-    commands = ("effort",)
     alternatives = ("position", "force")
     becomes: ClassVar[Mapping[str, str]] = {
         "position": "the closed position with the probing force, at the greatest speed that is allowed",
@@ -155,10 +152,6 @@ class ForceController(Controller[ForceConfig]):
     def asked_force_n(self) -> float:
         """Return the probing force (N)."""
         return float(self.config.probing_force_n)
-
-    def contact_force_n(self) -> float:
-        """Return the contact force (N) of the supervision."""
-        return float(self.config.contact_force_n)
 
     def params(self) -> Any:
         """Return the numbers of the config, and those of `force_numbers`."""

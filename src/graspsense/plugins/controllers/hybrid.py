@@ -18,7 +18,6 @@ from graspsense.plugin_api import (
     POSITION,
     VELOCITY,
     Command,
-    Controller,
     Frame,
     Reading,
     RestState,
@@ -40,8 +39,8 @@ from graspsense.plugins.controllers.own_loop import (
 )
 from graspsense.plugins.controllers.supervision import (
     EVENTS,
-    LAW_CHANNELS,
     GraspProgress,
+    SupervisedController,
     SupervisionConfig,
     events_of,
     free_limits,
@@ -162,11 +161,9 @@ def free_end(params: Any, state: HybridState, integral_n: float, effort_n: float
     )
 
 
-class HybridController(Controller[HybridConfig]):
+class HybridController(SupervisedController[HybridConfig]):
     """The controller of the paper, and the default."""
 
-    requires = LAW_CHANNELS
-    commands = ("effort",)
     alternatives = ("velocity", "position")
     becomes: ClassVar[Mapping[str, str]] = {
         "position": f"the closed position at the closing speed with {STEPS}",
@@ -195,10 +192,6 @@ class HybridController(Controller[HybridConfig]):
     def asked_speed_m_s(self) -> float:
         """Return the closing speed (m/s)."""
         return float(self.config.closing_speed_m_s)
-
-    def contact_force_n(self) -> float:
-        """Return the contact force (N) of the supervision."""
-        return float(self.config.contact_force_n)
 
     def params(self) -> Any:
         """Return the numbers of the config, and those of `force_numbers`."""

@@ -8,7 +8,7 @@ result codes of `GraspClosedLoop.srv`.
 from __future__ import annotations
 
 from math import inf
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, TypeVar
 
 from attrs import frozen
 
@@ -26,6 +26,7 @@ from graspsense.plugin_api import (
     SQUEEZE,
     STEADY,
     Channel,
+    Controller,
     Frame,
     RestState,
     at_rest,
@@ -162,6 +163,20 @@ def law_numbers(
 
 EVENTS: Final = ("contact", "slip")
 """The events that every control law of this package tells: both pads touch; the object slipped out."""
+
+
+ConfigT = TypeVar("ConfigT", bound=SupervisionConfig)
+
+
+class SupervisedController(Controller[ConfigT]):
+    """A control law of this package that commands an effort, unless it is told to send something else."""
+
+    requires = LAW_CHANNELS
+    commands = ("effort",)
+
+    def contact_force_n(self) -> float:
+        """Return the contact force (N) of the supervision."""
+        return float(self.config.contact_force_n)
 
 
 def events_of(earlier: GraspProgress, later: GraspProgress) -> int:

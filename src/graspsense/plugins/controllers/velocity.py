@@ -17,15 +17,14 @@ from graspsense.plugin_api import (
     POSITION,
     VELOCITY,
     Command,
-    Controller,
     Frame,
     Reading,
     setting,
 )
 from graspsense.plugins.controllers.supervision import (
     EVENTS,
-    LAW_CHANNELS,
     LawState,
+    SupervisedController,
     SupervisionConfig,
     events_of,
     free_end,
@@ -120,11 +119,9 @@ def free_command(
     return closing_effort(params, integral_n, velocity_m_s, dt_s)
 
 
-class VelocityController(Controller[VelocityConfig]):
+class VelocityController(SupervisedController[VelocityConfig]):
     """Closes at a given speed."""
 
-    requires = LAW_CHANNELS
-    commands = ("effort",)
     alternatives = ("velocity", "position")
     becomes: ClassVar[Mapping[str, str]] = {
         "position": "the closed position at the closing speed with the greatest force that is allowed",
@@ -137,10 +134,6 @@ class VelocityController(Controller[VelocityConfig]):
     def asked_speed_m_s(self) -> float:
         """Return the closing speed (m/s)."""
         return float(self.config.closing_speed_m_s)
-
-    def contact_force_n(self) -> float:
-        """Return the contact force (N) of the supervision."""
-        return float(self.config.contact_force_n)
 
     def params(self) -> Any:
         """Return the numbers of the config, and those of `law_numbers`."""
