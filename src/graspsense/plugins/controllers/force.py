@@ -13,7 +13,6 @@ from attrs import frozen
 
 from graspsense.plugin_api import (
     APPROACH,
-    EFFORT,
     POSITION,
     Command,
     Frame,
@@ -26,14 +25,14 @@ from graspsense.plugins.controllers.supervision import (
     SupervisedController,
     SupervisionConfig,
     events_of,
+    free_begin,
     free_end,
-    free_limits,
     law_numbers,
     law_state,
     not_begun,
     supervise,
 )
-from graspsense.simulator_api import NOT_FREE, FreeLimits, FreeMotion, params_of
+from graspsense.simulator_api import FreeMotion, params_of
 
 
 @frozen(kw_only=True, slots=False)
@@ -123,11 +122,6 @@ def step(params: Any, state: LawState, reading: Reading) -> tuple[Command, LawSt
     return Command(params.sends, value, limit, inf), law_state(
         progress, effort, events_of(state.progress, progress)
     )
-
-
-def free_begin(params: Any, state: LawState, frame: Frame) -> tuple[float, FreeLimits]:
-    """Begin free motion: its memory is the effort, which is constant."""
-    return state.effort_n, free_limits(params, state.progress) if params.sends == EFFORT else NOT_FREE
 
 
 def free_command(

@@ -52,7 +52,7 @@ from graspsense.plugins.controllers.velocity import (
     closing_effort,
     free_command,
 )
-from graspsense.simulator_api import NOT_FREE, FreeLimits, FreeMotion, params_of
+from graspsense.simulator_api import FreeLimits, FreeMotion, params_of
 
 
 @frozen(kw_only=True, slots=False)
@@ -142,7 +142,7 @@ def own_command(params: Any, phase: int, sent: Raised, effort_n: float) -> Comma
 
 def free_begin(params: Any, state: HybridState, frame: Frame) -> tuple[float, FreeLimits]:
     """Begin free motion: its memory is the integral of the velocity loop."""
-    return state.integral_n, free_limits(params, state.progress) if params.sends == EFFORT else NOT_FREE
+    return state.integral_n, free_limits(params, state.progress)
 
 
 def free_end(params: Any, state: HybridState, integral_n: float, effort_n: float, t_s: float) -> HybridState:
