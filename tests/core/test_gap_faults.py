@@ -33,9 +33,9 @@ def frame(k, gap_m, velocity_m_s=0.0):
     return Frame(k / RATE_HZ, 1.0 / RATE_HZ, gap_m, velocity_m_s, nan, nan, nan, nan, nan, 0)
 
 
-def jumps(command, gap_of, velocity_m_s=0.0):
-    """Return in which frames the gap jumps under this command."""
-    watch, seen = GapJump(0.2), []
+def jumps(command, gap_of, velocity_m_s=0.0, rate_hz=RATE_HZ):
+    """Return in which frames the gap jumps under this command, of a gripper that declares this rate."""
+    watch, seen = GapJump(0.2, rate_hz), []
     for k in range(100):
         now = frame(k, gap_of(k), velocity_m_s)
         if watch.see(now) is not None:
@@ -70,6 +70,11 @@ def closing(k):
 )
 def test_a_gap_that_changes_faster_than_the_fingers_were_told_jumps(command, gap_of, seen):
     assert jumps(command, gap_of) == seen
+
+
+@every_case(("rate_hz", "seen"), [(RATE_HZ, []), (1000.0, [50])])
+def test_in_a_shorter_period_an_object_that_breaks_explains_a_shorter_way(rate_hz, seen):
+    assert jumps(CLOSES, lambda k: closing(k) - 0.0018 * (k >= 50), rate_hz=rate_hz) == seen
 
 
 @every_case(
@@ -116,7 +121,7 @@ def test_under_an_effort_a_gap_that_jumps_is_known_by_a_velocity_that_is_measure
     ],
 )
 def test_a_gap_that_jumps_is_no_motor_that_turns_the_wrong_way(gap_of, name, relaxes):
-    jump, motor, faults = GapJump(0.2), Motor(False, RATE_HZ), []
+    jump, motor, faults = GapJump(0.2, RATE_HZ), Motor(False, RATE_HZ), []
     for k in range(100):
         now = frame(k, gap_of(k))
         if jump.see(now) is not None:

@@ -36,6 +36,8 @@ def accelerating(t):
         (CLOSES, APPROACH, lambda t: 0.01 * t, {False}),
         (CLOSES, APPROACH, lambda t: in_steps(0.01 * t, 0.0002), {False}),
         (CLOSES, APPROACH, lambda t: 0.035 * t, {False}),
+        (CLOSES, APPROACH, lambda t: 0.025 * t, {False}),
+        (CLOSES, APPROACH, lambda t: 0.023 * t, set()),
         # Twice as fast ends it, beyond the limit of a first use.
         (CLOSES, APPROACH, lambda t: 0.042 * t, {False}),
         (CLOSES, APPROACH, lambda t: 0.05 * t, {True}),

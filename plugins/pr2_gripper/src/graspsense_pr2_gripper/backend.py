@@ -38,7 +38,6 @@ from graspsense_pr2_gripper.measure import Measure
 from graspsense_pr2_gripper.opening import Opened, open_board
 from graspsense_pr2_gripper.protocol import (
     EFFORT_KIND,
-    RELEASE_KIND,
     Identity,
     OutputReport,
     ProtocolError,
@@ -63,8 +62,6 @@ _CHANNELS: Final = (
 OPENING_N: Final = -20.0
 """Effort that opens the fingers. The authors' recordings show 17 and 20 N, opening, between squeezes."""
 TARE_IMAGES: Final = 6
-_RELEASE: Final = (RELEASE_KIND, 0, 0, 0)
-"""What `OutputReport` has after its counter, of a command that lets go."""
 UNHEARD_S: Final = 0.1
 """Device time without the echo of a command after which the device counts as lost."""
 UNHEARD_COMMANDS: Final = 5
@@ -139,7 +136,7 @@ class Pr2Backend(BackendWithEmulator[Pr2Config]):
 
         Any other command, and an effort of NaN, relaxes the gripper.
         """
-        numbers = _RELEASE
+        report = OutputReport()
         if command.kind == EFFORT:
             with suppress(ProtocolError):
                 most_un = limit(min(command.effort_limit_n, self._effort_limit_n))
@@ -147,8 +144,13 @@ class Pr2Backend(BackendWithEmulator[Pr2Config]):
                 # In whole numbers, since the board reports an effort that it must clamp.
                 effort_un = min(max(effort_un, -most_un), most_un)
                 speed_um_s = limit(min(command.speed_limit_m_s, self._speed_limit_m_s))
-                numbers = EFFORT_KIND, effort_un, most_un, speed_um_s
-        self._send(self._open(), *numbers)
+                report = OutputReport(
+                    kind=EFFORT_KIND,
+                    effort_un=effort_un,
+                    effort_limit_un=most_un,
+                    speed_limit_um_s=speed_um_s,
+                )
+        self._send(self._open(), report)
 
     def tare(self, images: Sequence[Pads]) -> None:
         """Set the zero of the pads. Raises TareRefused."""
@@ -162,7 +164,7 @@ class Pr2Backend(BackendWithEmulator[Pr2Config]):
             return
         if self._sent:
             with suppress(DeviceLost):
-                self._send(opened, *_RELEASE)
+                self._send(opened, OutputReport())
         if opened.link.gone:
             self._lost_serial = opened.identity.serial
         clean = opened.link.close()
@@ -235,18 +237,10 @@ class Pr2Backend(BackendWithEmulator[Pr2Config]):
             status_bits=status_bits(config.swap_fingers),
         )
 
-    def _send(
-        self, opened: Opened, kind: int, effort_un: int, effort_limit_un: int, speed_limit_um_s: int
-    ) -> None:
+    def _send(self, opened: Opened, report: OutputReport) -> None:
+        """Send a command with the next counter."""
         self._sent += 1
-        command = OutputReport(
-            counter=self._sent & 0xFFFF,
-            kind=kind,
-            effort_un=effort_un,
-            effort_limit_un=effort_limit_un,
-            speed_limit_um_s=speed_limit_um_s,
-        )
-        opened.link.send(encode_output(command))
+        opened.link.send(encode_output(report._replace(counter=self._sent & 0xFFFF)))
 
     def _counted(self, opened: Opened) -> dict[str, float | int | str | bool]:
         link, emulation = opened.link, opened.emulation

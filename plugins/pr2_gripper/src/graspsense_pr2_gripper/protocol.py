@@ -77,13 +77,13 @@ class InputReport(NamedTuple):
 
 
 class OutputReport(NamedTuple):
-    """Report 2, a command."""
+    """Report 2, a command; by default one that lets go."""
 
-    counter: int
-    kind: int
-    effort_un: int
-    effort_limit_un: int
-    speed_limit_um_s: int
+    counter: int = 0
+    kind: int = RELEASE_KIND
+    effort_un: int = 0
+    effort_limit_un: int = 0
+    speed_limit_um_s: int = 0
 
 
 class Identity(NamedTuple):

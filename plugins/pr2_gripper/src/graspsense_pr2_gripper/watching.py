@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 from attrs import asdict
 
 from graspsense_pr2_gripper.link import Link
-from graspsense_pr2_gripper.protocol import RELEASE_KIND, OutputReport, encode_output
+from graspsense_pr2_gripper.protocol import OutputReport, encode_output
 
 TRIPS: Final = 50
 TRIP_S: Final = 0.5
@@ -73,13 +73,7 @@ def _trips(link: Link) -> list[float]:
     for trip in range(TRIPS):
         counter = FIRST_COUNTER + trip
         sent = time.monotonic()
-        link.send(
-            encode_output(
-                OutputReport(
-                    counter=counter, kind=RELEASE_KIND, effort_un=0, effort_limit_un=0, speed_limit_um_s=0
-                )
-            )
-        )
+        link.send(encode_output(OutputReport(counter=counter)))
         while time.monotonic() - sent < TRIP_S:
             arrival = link.next(TRIP_S)
             if arrival is not None and arrival.report.echo == counter:

@@ -330,7 +330,7 @@ class _Grasp:
             self.interrupts.deferred = True
             self.interrupts.tick_ended()
             fault = self._fault()
-            self._let_go(opens=not (self.state.done or (fault is not None and fault.relaxes)))
+            self._let_go(opens=fault is None or not fault.relaxes)
         if ending is None and fault is not None and self.protection is not None:
             ending = fault.outcome, self.protection.cause_of(fault).told
         if ending is None:
@@ -583,10 +583,11 @@ class _Grasp:
     def _let_go(self, *, opens: bool) -> None:
         """Open the fingers, then relax, and tell how they were left. A failure of one step must not prevent the next.
 
-        With `opens` false, because the fingers are open, it only relaxes.
+        With `opens` false, because the motor would close them, it only relaxes, as it does with open fingers. Fingers
+        that a release has not opened are told once more: the gripper may not have heard it.
         """
         left = "let go, not opened"
-        opens = opens and self.state.phase >= APPROACH
+        opens = opens and self.state.phase >= APPROACH and not (self.state.done and self._is_open())
         try:
             if opens and self.info.opening is not None and self.last is not None:
                 left = self._opened(self.info.opening, self.last)
@@ -597,10 +598,15 @@ class _Grasp:
         if self.info.opening is None or self.last is None:
             return
         if self.protection is not None and self.recorder.frames:
-            is_open = self.protection.opening.is_open(self.last.gap_m)
-            self.may_be_closed = not (is_open and (self.state.done or left.startswith(OPENED)))
+            self.may_be_closed = not (self._is_open() and (self.state.done or left.startswith(OPENED)))
         if not self.state.done:
             self._event(self.last.t_s, Phase(self.state.phase), left)
+
+    def _is_open(self) -> bool:
+        """Return whether the last frame shows open fingers, where that matters."""
+        return (
+            self.last is None or self.protection is None or self.protection.opening.is_open(self.last.gap_m)
+        )
 
     def _opened(self, opening: Command, last: Frame) -> str:
         """Open the fingers, and return in words whether they came to rest."""
@@ -629,7 +635,7 @@ class _Grasp:
             still = update_rest(still, last.t_s, last.gap_m, OPEN_SPEED_M_S, OPEN_WINDOW_S)
             unknown_s = 0.0 if self.protection is None else self.protection.opening.unknown_s(last.gap_m)
             if at_rest(still, last.t_s, OPEN_WINDOW_S) and last.t_s - began_s >= unknown_s:
-                if self.protection is None or self.protection.opening.is_open(last.gap_m):
+                if self._is_open():
                     return f"{OPENED} {last.gap_m * 1e3:.1f} mm"
                 break
             if last.t_s - began_s > run.opening_timeout_s:

@@ -13,28 +13,26 @@ from attrs import frozen
 
 from graspsense.plugin_api import (
     APPROACH,
-    EFFORT,
     POSITION,
     Command,
-    Controller,
     Frame,
     Reading,
     setting,
 )
 from graspsense.plugins.controllers.supervision import (
     EVENTS,
-    LAW_CHANNELS,
     LawState,
+    SupervisedController,
     SupervisionConfig,
     events_of,
+    free_begin,
     free_end,
-    free_limits,
     law_numbers,
     law_state,
     not_begun,
     supervise,
 )
-from graspsense.simulator_api import NOT_FREE, FreeLimits, FreeMotion, params_of
+from graspsense.simulator_api import FreeMotion, params_of
 
 
 @frozen(kw_only=True, slots=False)
@@ -126,11 +124,6 @@ def step(params: Any, state: LawState, reading: Reading) -> tuple[Command, LawSt
     )
 
 
-def free_begin(params: Any, state: LawState, frame: Frame) -> tuple[float, FreeLimits]:
-    """Begin free motion: its memory is the effort, which is constant."""
-    return state.effort_n, free_limits(params, state.progress) if params.sends == EFFORT else NOT_FREE
-
-
 def free_command(
     params: Any, memory: float, gap_m: float, velocity_m_s: float, dt_s: float
 ) -> tuple[float, float]:
@@ -138,11 +131,9 @@ def free_command(
     return params.probing_force_n, params.probing_force_n
 
 
-class ForceController(Controller[ForceConfig]):
+class ForceController(SupervisedController[ForceConfig]):
     """Closes with a constant effort, or squeezes to a given force."""
 
-    requires = LAW_CHANNELS
-    commands = ("effort",)
     alternatives = ("position", "force")
     becomes: ClassVar[Mapping[str, str]] = {
         "position": "the closed position with the probing force, at the greatest speed that is allowed",
@@ -155,10 +146,6 @@ class ForceController(Controller[ForceConfig]):
     def asked_force_n(self) -> float:
         """Return the probing force (N)."""
         return float(self.config.probing_force_n)
-
-    def contact_force_n(self) -> float:
-        """Return the contact force (N) of the supervision."""
-        return float(self.config.contact_force_n)
 
     def params(self) -> Any:
         """Return the numbers of the config, and those of `force_numbers`."""

@@ -18,7 +18,6 @@ from graspsense.plugin_api import (
     POSITION,
     VELOCITY,
     Command,
-    Controller,
     Frame,
     Reading,
     RestState,
@@ -40,8 +39,8 @@ from graspsense.plugins.controllers.own_loop import (
 )
 from graspsense.plugins.controllers.supervision import (
     EVENTS,
-    LAW_CHANNELS,
     GraspProgress,
+    SupervisedController,
     SupervisionConfig,
     events_of,
     free_limits,
@@ -53,7 +52,7 @@ from graspsense.plugins.controllers.velocity import (
     closing_effort,
     free_command,
 )
-from graspsense.simulator_api import NOT_FREE, FreeLimits, FreeMotion, params_of
+from graspsense.simulator_api import FreeLimits, FreeMotion, params_of
 
 
 @frozen(kw_only=True, slots=False)
@@ -143,7 +142,7 @@ def own_command(params: Any, phase: int, sent: Raised, effort_n: float) -> Comma
 
 def free_begin(params: Any, state: HybridState, frame: Frame) -> tuple[float, FreeLimits]:
     """Begin free motion: its memory is the integral of the velocity loop."""
-    return state.integral_n, free_limits(params, state.progress) if params.sends == EFFORT else NOT_FREE
+    return state.integral_n, free_limits(params, state.progress)
 
 
 def free_end(params: Any, state: HybridState, integral_n: float, effort_n: float, t_s: float) -> HybridState:
@@ -162,11 +161,9 @@ def free_end(params: Any, state: HybridState, integral_n: float, effort_n: float
     )
 
 
-class HybridController(Controller[HybridConfig]):
+class HybridController(SupervisedController[HybridConfig]):
     """The controller of the paper, and the default."""
 
-    requires = LAW_CHANNELS
-    commands = ("effort",)
     alternatives = ("velocity", "position")
     becomes: ClassVar[Mapping[str, str]] = {
         "position": f"the closed position at the closing speed with {STEPS}",
@@ -195,10 +192,6 @@ class HybridController(Controller[HybridConfig]):
     def asked_speed_m_s(self) -> float:
         """Return the closing speed (m/s)."""
         return float(self.config.closing_speed_m_s)
-
-    def contact_force_n(self) -> float:
-        """Return the contact force (N) of the supervision."""
-        return float(self.config.contact_force_n)
 
     def params(self) -> Any:
         """Return the numbers of the config, and those of `force_numbers`."""

@@ -8,7 +8,7 @@ result codes of `GraspClosedLoop.srv`.
 from __future__ import annotations
 
 from math import inf
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, TypeVar
 
 from attrs import frozen
 
@@ -16,6 +16,7 @@ from graspsense.gripper_api import CRUSHED, SIDE_IMPACT, SLIPPED, TOO_WIDE, eith
 from graspsense.plugin_api import (
     APPROACH,
     CONTACT_FORCE_N,
+    EFFORT,
     HOLD,
     NEVER_STEADY,
     NOTHING_THERE,
@@ -26,6 +27,7 @@ from graspsense.plugin_api import (
     SQUEEZE,
     STEADY,
     Channel,
+    Controller,
     Frame,
     RestState,
     at_rest,
@@ -164,6 +166,20 @@ EVENTS: Final = ("contact", "slip")
 """The events that every control law of this package tells: both pads touch; the object slipped out."""
 
 
+ConfigT = TypeVar("ConfigT", bound=SupervisionConfig)
+
+
+class SupervisedController(Controller[ConfigT]):
+    """A control law of this package that commands an effort, unless it is told to send something else."""
+
+    requires = LAW_CHANNELS
+    commands = ("effort",)
+
+    def contact_force_n(self) -> float:
+        """Return the contact force (N) of the supervision."""
+        return float(self.config.contact_force_n)
+
+
 def events_of(earlier: GraspProgress, later: GraspProgress) -> int:
     """Return the bits of the `EVENTS` between two ticks."""
     if later.phase != APPROACH and earlier.phase == APPROACH:
@@ -210,8 +226,13 @@ def law_state(progress: GraspProgress, effort_n: float, events: int) -> LawState
     )
 
 
+def free_begin(params: Any, state: LawState, frame: Frame) -> tuple[float, FreeLimits]:
+    """Begin free motion: its memory is the effort that the law keeps."""
+    return state.effort_n, free_limits(params, state.progress)
+
+
 def free_end(params: Any, state: LawState, memory_n: float, effort_n: float, t_s: float) -> LawState:
-    """Return the state after free motion, whose memory is the effort that the law keeps."""
+    """Return the state after free motion."""
     return law_state(state.progress, memory_n, 0)
 
 
@@ -229,8 +250,11 @@ def supervise(params: Any, now: GraspProgress, frame: Frame, still: RestState) -
 
 
 def free_limits(params: Any, now: GraspProgress) -> FreeLimits:
-    """Return until when `supervise` returns the same progress, if no force changes (see `FreeMotion`)."""
-    if now.phase == APPROACH and now.outcome == RUNNING and now.begun == 1:
+    """Return until when `supervise` returns the same progress, if no force changes (see `FreeMotion`).
+
+    Only a law that sends an effort has free motion.
+    """
+    if params.sends == EFFORT and now.phase == APPROACH and now.outcome == RUNNING and now.begun == 1:
         return FreeLimits(params.closed_gap_m, now.deadline_s)
     return NOT_FREE
 

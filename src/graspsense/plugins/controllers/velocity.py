@@ -13,29 +13,26 @@ from typing import Any, ClassVar, Literal
 from attrs import frozen
 
 from graspsense.plugin_api import (
-    EFFORT,
     POSITION,
     VELOCITY,
     Command,
-    Controller,
-    Frame,
     Reading,
     setting,
 )
 from graspsense.plugins.controllers.supervision import (
     EVENTS,
-    LAW_CHANNELS,
     LawState,
+    SupervisedController,
     SupervisionConfig,
     events_of,
+    free_begin,
     free_end,
-    free_limits,
     law_numbers,
     law_state,
     not_begun,
     supervise,
 )
-from graspsense.simulator_api import NOT_FREE, FreeLimits, FreeMotion, params_of
+from graspsense.simulator_api import FreeMotion, params_of
 
 
 @frozen(kw_only=True, slots=False)
@@ -108,11 +105,6 @@ def step(params: Any, state: LawState, reading: Reading) -> tuple[Command, LawSt
     )
 
 
-def free_begin(params: Any, state: LawState, frame: Frame) -> tuple[float, FreeLimits]:
-    """Begin free motion: its memory is the integral of the velocity loop."""
-    return state.effort_n, free_limits(params, state.progress) if params.sends == EFFORT else NOT_FREE
-
-
 def free_command(
     params: Any, integral_n: float, gap_m: float, velocity_m_s: float, dt_s: float
 ) -> tuple[float, float]:
@@ -120,11 +112,9 @@ def free_command(
     return closing_effort(params, integral_n, velocity_m_s, dt_s)
 
 
-class VelocityController(Controller[VelocityConfig]):
+class VelocityController(SupervisedController[VelocityConfig]):
     """Closes at a given speed."""
 
-    requires = LAW_CHANNELS
-    commands = ("effort",)
     alternatives = ("velocity", "position")
     becomes: ClassVar[Mapping[str, str]] = {
         "position": "the closed position at the closing speed with the greatest force that is allowed",
@@ -137,10 +127,6 @@ class VelocityController(Controller[VelocityConfig]):
     def asked_speed_m_s(self) -> float:
         """Return the closing speed (m/s)."""
         return float(self.config.closing_speed_m_s)
-
-    def contact_force_n(self) -> float:
-        """Return the contact force (N) of the supervision."""
-        return float(self.config.contact_force_n)
 
     def params(self) -> Any:
         """Return the numbers of the config, and those of `law_numbers`."""

@@ -102,7 +102,7 @@ class Protection:
         self._pad_absences = [Absence(fault, pads_hz or inf, expected=True) for fault in PADS_ABSENT]
         self._status = StatusWatch(info.status_bits)
         first_m_s = run.first_speed_m_s if info.clock == "device" else inf
-        self._standstill, self._jump = Standstill(), GapJump(info.speed_limit_m_s)
+        self._standstill, self._jump = Standstill(), GapJump(info.speed_limit_m_s, info.rate_hz)
         self._kept_speed = KeptSpeed(info.rate_hz, min(first_m_s, info.speed_limit_m_s))
         self._repeats = Repeats()
         opening = info.opening

@@ -37,7 +37,10 @@ TOLD_M: Final = 0.003
 JUMP: Final = 3.0
 """Speed over the commanded one that fingers can have between two frames, whose times are those of their arrival."""
 JUMP_M: Final = 0.001
-"""Change of the gap between two frames that is no jump: a few steps of a coarse encoder."""
+JUMP_STEPS: Final = 3.0
+FREE_M_S: Final = 0.3
+"""Change of the gap between two frames that is no jump at most: so many steps of the encoder, or the way at this speed,
+at which an object that breaks lets the fingers move."""
 FEW_JUMPS: Final = 4
 """Jumps of a gap to one side, for each to the other side and one more, that are not taken for motion."""
 
@@ -54,6 +57,8 @@ BLOCK_S: Final = 0.3
 BLOCKS: Final = 3
 STEADY_SHARE: Final = 0.1
 """Blocks in a row whose speeds differ by this share at most in a steady motion: fingers that accelerate are slow."""
+QUICK: Final = 1.2
+"""Speed of a steady motion, over the commanded one, from which on the fingers are too fast."""
 LEAST_M: Final = 0.001
 """Way by which the fingers must differ from what they were told: some steps of a coarse encoder."""
 
@@ -132,8 +137,8 @@ class Standstill:
 class GapJump:
     """Watches for a gap that changes faster than fingers with this limit of the speed move under their commands."""
 
-    def __init__(self, speed_limit_m_s: float) -> None:
-        self._limit_m_s = speed_limit_m_s
+    def __init__(self, speed_limit_m_s: float, rate_hz: float) -> None:
+        self._limit_m_s, self._free_m, self._least_m = speed_limit_m_s, FREE_M_S / rate_hz, JUMP_M
         self._gap_m, self._dt_s = nan, 0.0
         # What moves the fingers at first, or how old the first gap is, is not known.
         self._told_m_s = [inf, inf]
@@ -162,7 +167,10 @@ class GapJump:
         if self._effort:
             told_m_s = min(told_m_s, self._measured_m_s(frame.velocity_m_s))
         against = step_m * self._direction > 0.0
-        allowed_m = JUMP_M + (told_m_s * dt_s if against else JUMP * told_m_s * elapsed_s)
+        if step_m != 0.0:
+            self._least_m = min(self._least_m, abs(step_m))
+        allowed_m = min(max(JUMP_STEPS * self._least_m, self._free_m), JUMP_M)
+        allowed_m += told_m_s * dt_s if against else JUMP * told_m_s * elapsed_s
         if not abs(step_m) > allowed_m:
             self.step_m = 0.0
             return None
@@ -242,9 +250,9 @@ class KeptSpeed:
         self._too_fast_s = self._too_fast_s + frame.dt_s if too_fast else 0.0
         if self._too_fast_s > LASTS_S:
             return self._not_kept(speed_m_s, ends=speed_m_s > max(FAST_ENDS * abs(told_m_s), self._limit_m_s))
-        return self._slow(frame) if phase == APPROACH and told_m_s > 0.0 and not self._kept else None
+        return self._steady(frame) if phase == APPROACH and told_m_s > 0.0 else None
 
-    def _slow(self, frame: Frame) -> Fault | None:
+    def _steady(self, frame: Frame) -> Fault | None:
         """Compare the speeds of the last blocks of the approach."""
         if self._block_t_s != self._block_t_s:
             self._block_t_s, self._block_gap_m = frame.t_s, frame.gap_m
@@ -254,11 +262,13 @@ class KeptSpeed:
             return None
         speed_m_s = speed_since(self._block_t_s, self._block_gap_m, frame)
         self._block_t_s, self._block_gap_m = frame.t_s, frame.gap_m
-        self._kept = speed_m_s * FAST >= self._told_m_s
+        self._kept = self._kept or speed_m_s * FAST >= self._told_m_s
         blocks = self._blocks_m_s
         blocks.append(speed_m_s)
         steady = len(blocks) == BLOCKS and max(blocks) - min(blocks) <= STEADY_SHARE * speed_m_s
-        if self._kept or not steady or not speed_m_s * elapsed_s > LEAST_M:
+        if not steady or not speed_m_s * elapsed_s > LEAST_M:
+            return None
+        if self._kept and speed_m_s <= QUICK * self._told_m_s:
             return None
         return self._not_kept(speed_m_s)
 
