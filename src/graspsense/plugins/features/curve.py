@@ -21,18 +21,18 @@ from numpy.typing import NDArray
 
 from graspsense.plugin_api import Channel, Feature, Features, FeatureSet, Trace, setting
 from graspsense.plugins.features.contact_curve import (
+    LOADED,
     ContactCurve,
     Known,
     contact_curve,
     features_of,
+    few_samples,
     first_crossing,
 )
 from graspsense.plugins.features.contact_threshold import ContactThreshold
 
 Floats = NDArray[np.float64]
 
-LOADED: Final = 0.95
-"""Share of the largest force at which the loading ends; a plateau reaches the largest force itself by noise only."""
 LOADS: Final = (0.25, 0.5, 0.75)
 """Shares of the largest force at which the stiffness is measured, and of the loading at which its shape is."""
 HALF_WINDOW: Final = 0.2
@@ -136,6 +136,8 @@ _PADS: Final = (
     ),
 )
 _FEATURES: Final = (*_AT_CONTACT, *_LOADING, *_TRAVEL, *_COURSE, *_HOLD, *_RELEASE, *_PADS)
+_OF_RISE: Final = (*_AT_CONTACT, *_LOADING[1:], *_TRAVEL, *_COURSE)
+"""The features that depend on where in the rise of the force the contact is."""
 
 
 def _all(features: Sequence[Feature], why: str) -> Known:
@@ -165,6 +167,8 @@ class CurveFeatures(FeatureSet[CurveConfig]):
             known = _all(_FEATURES, curve)
         else:
             known = {"contact_gap": curve.contact_gap_m, **self._squeeze(curve)}
+            if curve.unresolved:
+                known |= _all(_OF_RISE, curve.unresolved)
         return features_of(self, known, trace, OF_GAP)
 
     def _squeeze(self, curve: ContactCurve) -> Known:
@@ -273,6 +277,8 @@ class CurveFeatures(FeatureSet[CurveConfig]):
         let_go = first_crossing(t_s, -curve.lowest_n[after], -self.config.contact_force_n)
         if let_go is None:
             return _all(_RELEASE, "the trace ends before the pads lose contact in the release")
+        if few := few_samples("fall", int(np.count_nonzero(t_s < let_go)) - 1):
+            return _all(_RELEASE, few)
         done, left = curve.work(np.array([curve.end_s, let_go])).tolist()
         begin_n = float(np.interp(curve.end_s, curve.t_s, curve.force_n))
         high = first_crossing(t_s, -curve.force_n[after], -LOADS[2] * begin_n)

@@ -85,7 +85,7 @@ class QuantileFeatures(FeatureSet[ContactThreshold]):
         lost_s = first_crossing(curve.t_s[last:], -curve.lowest_n[last:], -contact_force_n)
         end_s = float(curve.t_s[last]) if lost_s is None else lost_s
         values: list[float | str] = [
-            float(np.interp(start_s, samples.t_s, samples.gap_m)),
+            curve.unresolved or float(np.interp(start_s, samples.t_s, samples.gap_m)),
             end_s - start_s,
         ]
         inside = (samples.t_s >= start_s) & (samples.t_s <= end_s)
