@@ -148,7 +148,7 @@ def damaged_files() -> list[tuple[str, bytes, str]]:
         ("mid_line", good[:-4], "line 15: the file ends within this line"),
         ("taxel_lost", short, "line 5: 11 index taxel values; 12 are expected"),
         ("word", good.replace(b"45.0", b"fast", 1), "line 2: encoder value 'fast' is not a number"),
-        ("nan", good.replace(b"45.0", b"nan", 1), "line 2: encoder value nan is outside -360 to 360"),
+        ("nan", good.replace(b"45.0", b"nan", 1), "line 2: encoder value 'nan' is not a number"),
         (
             "nine_bits",
             good.replace(b"240.0", b"256.0", 1),

@@ -33,8 +33,10 @@ STILL_CLOSED: Final = 0.02
 """Share of the compression by which the fingers may open before such a release begins."""
 LOADED: Final = 0.95
 """Share of the largest force at which the loading ends; a plateau reaches the largest force itself by noise only."""
-RISE: Final = 3
-"""Fewest samples in a rise or a fall of the force that tell where in it the contact begins, or ends."""
+LEAST_SAMPLES: Final = 3
+"""Fewest samples of a contact, and in a rise or a fall of the force that tell where in it the contact begins, or ends.
+"""
+UNRESOLVED: Final = "contact not resolved: fewer than three samples in the {} of the force"
 
 
 Known = dict[str, float | str]
@@ -130,8 +132,8 @@ class ContactCurve:
     contact_gap_m: float
     end_s: float
     released: bool
-    unresolved: str
-    """Why the contact cannot be told from the samples in the rise of the force, empty if it can."""
+    resolved: bool
+    """Whether the samples in the rise of the force tell where in it the contact is."""
     impulse_n_s: Floats
     """The integral of the force over time from the contact on, at each sample."""
     work_j: Floats
@@ -207,7 +209,6 @@ def contact_curve(trace: Trace, contact_force_n: float) -> ContactCurve | str:
     start = _release(compression, force, phase)
     held = force[: len(force) if start is None else start + 1]
     loaded = int((held >= LOADED * held.max()).argmax())
-    over = between_samples and len(held) >= loaded + RISE
     # Where the contact falls on a sample, the first step has no length.
     with np.errstate(divide="ignore", invalid="ignore"):
         half_rise, velocity = 0.5 * (force[1:] - force[:-1]) / steps, travel / steps
@@ -221,17 +222,13 @@ def contact_curve(trace: Trace, contact_force_n: float) -> ContactCurve | str:
         contact_gap_m=float(gap[0]),
         end_s=float(t_s[-1] if start is None else t_s[start]),
         released=start is not None,
-        unresolved=few_samples("rise", max(loaded - 1, 0)) if over else "",
+        # Neither is there a rise before a first sample, nor has one ended where little follows.
+        resolved=not between_samples or loaded > LEAST_SAMPLES or len(held) < loaded + LEAST_SAMPLES,
         impulse_n_s=_summed(between * steps),
         work_j=_summed(between * travel),
         half_rise=half_rise,
         velocity_m_s=velocity,
     )
-
-
-def few_samples(what: str, samples: int) -> str:
-    """Return why a rise or a fall of the force with so many samples tells no contact, empty if it does."""
-    return f"contact not resolved: {samples} samples in the {what} of the force" if samples < RISE else ""
 
 
 def _summed(parts: Floats) -> Floats:

@@ -21,12 +21,13 @@ from numpy.typing import NDArray
 
 from graspsense.plugin_api import Channel, Feature, Features, FeatureSet, Trace, setting
 from graspsense.plugins.features.contact_curve import (
+    LEAST_SAMPLES,
     LOADED,
+    UNRESOLVED,
     ContactCurve,
     Known,
     contact_curve,
     features_of,
-    few_samples,
     first_crossing,
 )
 from graspsense.plugins.features.contact_threshold import ContactThreshold
@@ -41,7 +42,6 @@ POINTS: Final = np.linspace(0.0, 1.0, 17)
 """The points of a local regression, as shares of its time."""
 RELAXED: Final = 0.05
 """Share of the largest force that must be lost in the hold for a time of relaxation."""
-LEAST_SAMPLES: Final = 3
 
 
 @frozen(kw_only=True)
@@ -167,8 +167,8 @@ class CurveFeatures(FeatureSet[CurveConfig]):
             known = _all(_FEATURES, curve)
         else:
             known = {"contact_gap": curve.contact_gap_m, **self._squeeze(curve)}
-            if curve.unresolved:
-                known |= _all(_OF_RISE, curve.unresolved)
+            if not curve.resolved:
+                known |= _all(_OF_RISE, UNRESOLVED.format("rise"))
         return features_of(self, known, trace, OF_GAP)
 
     def _squeeze(self, curve: ContactCurve) -> Known:
@@ -277,8 +277,8 @@ class CurveFeatures(FeatureSet[CurveConfig]):
         let_go = first_crossing(t_s, -curve.lowest_n[after], -self.config.contact_force_n)
         if let_go is None:
             return _all(_RELEASE, "the trace ends before the pads lose contact in the release")
-        if few := few_samples("fall", int(np.count_nonzero(t_s < let_go)) - 1):
-            return _all(_RELEASE, few)
+        if np.count_nonzero(t_s < let_go) <= LEAST_SAMPLES:
+            return _all(_RELEASE, UNRESOLVED.format("fall"))
         done, left = curve.work(np.array([curve.end_s, let_go])).tolist()
         begin_n = float(np.interp(curve.end_s, curve.t_s, curve.force_n))
         high = first_crossing(t_s, -curve.force_n[after], -LOADS[2] * begin_n)
