@@ -136,7 +136,7 @@ def damaged_files() -> list[tuple[str, bytes, str]]:
     lines = good.split(b"\r\n")
     short = b"\r\n".join([*lines[:4], b" ".join(lines[4].split()[:11]), *lines[5:]])
     return [
-        ("empty", b"", "is empty"),
+        ("empty", b"", "line 1: it starts with ''"),
         ("other", b"t,gap\n0,1\n", "line 1: it starts with 't,gap'"),
         ("binary", bytes(range(256)), "line 2: byte 0x80 is not UTF-8"),
         ("first_line_only", b"-10000\r\n", "line 1: there is no frame"),
