@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from attrs import evolve
 from traces import made_trace
 
 from graspsense.core.values.signals import Phase
