@@ -180,6 +180,15 @@ def test_features_scale_with_their_units(length, force, time):
         assert converted[name] == expected, name
 
 
+def test_a_rise_of_few_samples_tells_no_contact_and_a_force_that_stays_is_measured_again():
+    few, some, dense = (
+        FEATURES.extract(grasp(np.arange(0.01, 2.2, step_s), relaxing=0.0)) for step_s in (0.2, 0.03, 0.001)
+    )
+    assert {"compression", "stiffness_50", "load_x25", "unloading_stiffness"} <= set(few.reasons)
+    assert "in the rise" in few.reasons["contact_gap"]
+    assert_close(some, dense, ("contact_gap", "compression", "loading_time", "stiffness_50"), rel=0.1)
+
+
 def test_noise_of_the_pads_does_not_bias_stiffness_and_force():
     quiet, noisy = FEATURES.extract(grasp(EVEN)), FEATURES.extract(grasp(EVEN, noise=0.3))
     assert noisy["peak_force"] == pytest.approx(quiet["peak_force"], rel=0.02)
@@ -248,7 +257,7 @@ def test_most_features_of_the_icub_recordings_are_defined_where_there_is_contact
     known = ~np.isnan(table.values)
     touched = known.any(axis=1)
     # Table I needs both pads and rest: 133 grasps have any of its features, 96 all of them.
-    assert (len(table), int(touched.sum())) == (203, 167)
+    assert (len(table), int(touched.sum())) == (203, 166)
     before_release = [name not in RELEASE_NAMES for name in table.names]
-    assert known[touched][:, before_release].mean() > 0.85
+    assert known[touched][:, before_release].mean() > 0.8
     assert not known[:, np.logical_not(before_release)].any(), "the recordings end before the release"

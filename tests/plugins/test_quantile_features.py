@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from attrs import evolve
 from traces import made_trace
 
 from graspsense.core.values.signals import Phase
@@ -57,12 +56,6 @@ def test_which_samples_a_recording_has_and_how_long_it_goes_on_does_not_count():
     assert extract(spring(EVEN[chosen])).values == pytest.approx(expected, rel=0.02, abs=0.02)
     later = np.concatenate((EVEN, [1.0, 5.0]))
     assert extract(spring(later)).values == pytest.approx(expected, rel=1e-9, abs=1e-9)
-
-
-def test_swapping_the_fingers_changes_nothing():
-    trace = spring()
-    swapped = evolve(trace, force_left_n=trace.force_right_n, force_right_n=trace.force_left_n)
-    assert extract(swapped).values == extract(trace).values
 
 
 def test_a_grasp_without_contact_or_with_too_few_samples_has_none_with_the_reason():

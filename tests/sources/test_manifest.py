@@ -290,25 +290,26 @@ def test_a_gap_that_stops_for_a_squeeze_does_not_join_it_with_the_next(tmp_path)
 
 
 @every_case(
-    ("pads", "gap_m", "told"),
+    ("pads", "gap_m", "rate", "told"),
     [
-        ((1.0, 1.0), 0.0, None),
-        # Noise and forces that differ by a tenth are no fault.
-        ((1.1, 1.1), 0.0, None),
-        ((0.4, 0.4), 0.0, "the force is another one at the same gap"),
-        ((0.6, 1.0), 0.0, "the right pad bears another share"),
-        ((1.0, 1.0), 0.004, "the fingers open to another gap"),
+        ((1.0, 1.0), 0.0, 1.0, None),
+        # Noise, and forces and times that differ by a tenth, are no fault.
+        ((1.1, 1.1), 0.0, 1.1, None),
+        ((0.4, 0.4), 0.0, 1.0, "the force is another one at the same gap"),
+        ((0.6, 1.0), 0.0, 1.0, "the right pad bears another share"),
+        ((1.0, 1.0), 0.004, 1.0, "the fingers open to another gap"),
+        ((1.0, 1.0), 0.0, 2.0, "samples are further apart"),
     ],
 )
 @every_case("split", ["force", "trial"])
-def test_one_of_several_squeezes_that_is_unlike_the_others_is_told(pads, gap_m, told, split, tmp_path):
-    """A gain, or a zero of the gap, that is another one in the third of five squeezes; the others are not doubted."""
+def test_one_of_several_squeezes_that_is_unlike_the_others_is_told(pads, gap_m, rate, told, split, tmp_path):
+    """A gain, a zero of the gap, or a rate of the clock of the third of five squeezes; the others are not doubted."""
     gaps, force, time = repeated(1.0, 1.0, 1.0, 1.0, 1.0)
     spoilt_rows = np.arange(len(time)) // 600 == 2
     noise = np.random.default_rng(7).normal(0.0, 0.05, (2, len(time)))
     left, right = (np.where(spoilt_rows, gain, 1.0) * force for gain in pads)
     columns = {
-        "t": time,
+        "t": np.cumsum(np.where(spoilt_rows, rate, 1.0) * np.diff(time, prepend=time[0])),
         "gap": 1e3 * (gaps + gap_m * spoilt_rows),
         "L": left + noise[0],
         "R": right + noise[1],

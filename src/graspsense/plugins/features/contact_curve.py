@@ -31,6 +31,12 @@ HELD: Final = 0.9
 """Share of its peak from which on a force is still that of a hold, where the gap was not recorded."""
 STILL_CLOSED: Final = 0.02
 """Share of the compression by which the fingers may open before such a release begins."""
+LOADED: Final = 0.95
+"""Share of the largest force at which the loading ends; a plateau reaches the largest force itself by noise only."""
+LEAST_SAMPLES: Final = 3
+"""Fewest samples of a contact, and in a rise or a fall of the force that tell where in it the contact begins, or ends.
+"""
+UNRESOLVED: Final = "contact not resolved: fewer than three samples in the {} of the force"
 
 
 Known = dict[str, float | str]
@@ -103,9 +109,8 @@ def _new_forces(t_s: Floats, pads: Floats) -> NDArray[np.int64] | slice:
     if not len(changed) or np.count_nonzero(changed) < 2 or changed.mean() > STAIRCASE:
         return slice(None)
     new = np.concatenate(([0], np.flatnonzero(changed) + 1))
-    until = np.append(new[1:], len(t_s)) - 1
-    held = t_s[until] - t_s[new] > REPEATED * np.median(np.diff(t_s[new]))
-    return np.union1d(new, until[held])
+    since = t_s - t_s[new].repeat(np.diff(np.append(new, len(t_s))))
+    return np.union1d(new, np.flatnonzero(since > REPEATED * np.median(np.diff(t_s[new]))))
 
 
 @frozen(kw_only=True, eq=False)
@@ -127,6 +132,8 @@ class ContactCurve:
     contact_gap_m: float
     end_s: float
     released: bool
+    resolved: bool
+    """Whether the samples in the rise of the force tell where in it the contact is."""
     impulse_n_s: Floats
     """The integral of the force over time from the contact on, at each sample."""
     work_j: Floats
@@ -184,7 +191,8 @@ def contact_curve(trace: Trace, contact_force_n: float) -> ContactCurve | str:
     contact = int(touch.argmax())
     t_s, gap = samples.t_s[contact:], samples.gap_m[contact:]
     pads, phase = samples.pads[:, contact:], samples.phase[contact:]
-    if contact and lowest[contact - 1] < contact_force_n < lowest[contact]:
+    between_samples = bool(contact and lowest[contact - 1] < contact_force_n < lowest[contact])
+    if between_samples:
         # The contact is between two samples: where it is seen must not depend on their spacing.
         share = (contact_force_n - lowest[contact - 1]) / (lowest[contact] - lowest[contact - 1])
         seen_between = [
@@ -199,6 +207,8 @@ def contact_curve(trace: Trace, contact_force_n: float) -> ContactCurve | str:
     steps, travel = t_s[1:] - t_s[:-1], compression[1:] - compression[:-1]
     between = 0.5 * (force[1:] + force[:-1])
     start = _release(compression, force, phase)
+    held = force[: len(force) if start is None else start + 1]
+    loaded = int((held >= LOADED * held.max()).argmax())
     # Where the contact falls on a sample, the first step has no length.
     with np.errstate(divide="ignore", invalid="ignore"):
         half_rise, velocity = 0.5 * (force[1:] - force[:-1]) / steps, travel / steps
@@ -212,6 +222,8 @@ def contact_curve(trace: Trace, contact_force_n: float) -> ContactCurve | str:
         contact_gap_m=float(gap[0]),
         end_s=float(t_s[-1] if start is None else t_s[start]),
         released=start is not None,
+        # Neither is there a rise before a first sample, nor has one ended where little follows.
+        resolved=not between_samples or loaded > LEAST_SAMPLES or len(held) < loaded + LEAST_SAMPLES,
         impulse_n_s=_summed(between * steps),
         work_j=_summed(between * travel),
         half_rise=half_rise,

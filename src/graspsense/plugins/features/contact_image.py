@@ -152,10 +152,6 @@ class ContactImages(NamedTuple):
     shape: tuple[int, int, int]
     """(rows, columns, components) of an image; one row where the array has not as many cells as the settings say."""
 
-    def places(self) -> range:
-        """Return the numbers of the images in the squeeze."""
-        return range(self.unpressed, self.last)
-
     def zero(self) -> Floats:
         """Return the mean of the images before the squeeze."""
         total = np.zeros(self.shape)
@@ -226,10 +222,6 @@ class ContactImageFeatures(FeatureSet[ContactImageConfig]):
         return tuple(f"{name}_" for name in self._arrays) if len(self._arrays) > 1 else ("",)
 
     @property
-    def _grid(self) -> tuple[int, int]:
-        return self.config.rows, self.config.columns
-
-    @property
     def _is_camera(self) -> bool:
         return not self.config.dtype.startswith("float")
 
@@ -256,13 +248,15 @@ class ContactImageFeatures(FeatureSet[ContactImageConfig]):
         numbers = cells[0].size
         if numbers % components:
             return f"an image of {name!r} has {numbers} numbers, and features.components is {components}"
-        grid = self._grid if numbers == own.rows * own.columns * components else (1, numbers // components)
+        fits = numbers == own.rows * own.columns * components
+        grid = (own.rows, own.columns) if fits else (1, numbers // components)
         return ContactImages(cells, unpressed, last, (*grid, components))
 
     def _measured(self, images: ContactImages) -> dict[str, float]:
         """Return the quantities that these images show."""
         zero, share = images.zero(), self.config.least_share
-        totals = np.array([np.sum(self._pressed(images.change(i, zero))) for i in images.places()])
+        squeezed = range(images.unpressed, images.last)
+        totals = np.array([np.sum(self._pressed(images.change(i, zero))) for i in squeezed])
         peak = int(np.argmax(totals))
         change = images.change(images.unpressed + peak, zero)
         pressed = self._pressed(change)
@@ -273,7 +267,7 @@ class ContactImageFeatures(FeatureSet[ContactImageConfig]):
         if contact is None:
             return values
         values["area"] = contact.area
-        if pressed.shape == self._grid:
+        if pressed.shape == (self.config.rows, self.config.columns):
             values |= {
                 "centre_row": contact.centre[0],
                 "centre_column": contact.centre[1],
@@ -302,7 +296,8 @@ class ContactImageFeatures(FeatureSet[ContactImageConfig]):
         if "area" not in known and name not in ("total", "largest"):
             return "no cell is pressed"
         if "centre_row" not in known:
-            return f"the array has not features.rows x features.columns = {self._grid[0]} x {self._grid[1]} cells"
+            grid = f"{self.config.rows} x {self.config.columns}"
+            return f"the array has not features.rows x features.columns = {grid} cells"
         if name.rpartition("_")[2].isdigit():
             return "no cell is pressed in its image with this share of the total"
         return "the contact is round" if name == "angle" else "its numbers are too large"

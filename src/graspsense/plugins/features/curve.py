@@ -21,6 +21,9 @@ from numpy.typing import NDArray
 
 from graspsense.plugin_api import Channel, Feature, Features, FeatureSet, Trace, setting
 from graspsense.plugins.features.contact_curve import (
+    LEAST_SAMPLES,
+    LOADED,
+    UNRESOLVED,
     ContactCurve,
     Known,
     contact_curve,
@@ -31,8 +34,6 @@ from graspsense.plugins.features.contact_threshold import ContactThreshold
 
 Floats = NDArray[np.float64]
 
-LOADED: Final = 0.95
-"""Share of the largest force at which the loading ends; a plateau reaches the largest force itself by noise only."""
 LOADS: Final = (0.25, 0.5, 0.75)
 """Shares of the largest force at which the stiffness is measured, and of the loading at which its shape is."""
 HALF_WINDOW: Final = 0.2
@@ -41,7 +42,6 @@ POINTS: Final = np.linspace(0.0, 1.0, 17)
 """The points of a local regression, as shares of its time."""
 RELAXED: Final = 0.05
 """Share of the largest force that must be lost in the hold for a time of relaxation."""
-LEAST_SAMPLES: Final = 3
 
 
 @frozen(kw_only=True)
@@ -136,6 +136,8 @@ _PADS: Final = (
     ),
 )
 _FEATURES: Final = (*_AT_CONTACT, *_LOADING, *_TRAVEL, *_COURSE, *_HOLD, *_RELEASE, *_PADS)
+_OF_RISE: Final = (*_AT_CONTACT, *_LOADING[1:], *_TRAVEL, *_COURSE)
+"""The features that depend on where in the rise of the force the contact is."""
 
 
 def _all(features: Sequence[Feature], why: str) -> Known:
@@ -165,6 +167,8 @@ class CurveFeatures(FeatureSet[CurveConfig]):
             known = _all(_FEATURES, curve)
         else:
             known = {"contact_gap": curve.contact_gap_m, **self._squeeze(curve)}
+            if not curve.resolved:
+                known |= _all(_OF_RISE, UNRESOLVED.format("rise"))
         return features_of(self, known, trace, OF_GAP)
 
     def _squeeze(self, curve: ContactCurve) -> Known:
@@ -273,6 +277,8 @@ class CurveFeatures(FeatureSet[CurveConfig]):
         let_go = first_crossing(t_s, -curve.lowest_n[after], -self.config.contact_force_n)
         if let_go is None:
             return _all(_RELEASE, "the trace ends before the pads lose contact in the release")
+        if np.count_nonzero(t_s < let_go) <= LEAST_SAMPLES:
+            return _all(_RELEASE, UNRESOLVED.format("fall"))
         done, left = curve.work(np.array([curve.end_s, let_go])).tolist()
         begin_n = float(np.interp(curve.end_s, curve.t_s, curve.force_n))
         high = first_crossing(t_s, -curve.force_n[after], -LOADS[2] * begin_n)

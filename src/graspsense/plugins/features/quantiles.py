@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 
 from graspsense.plugin_api import Channel, Feature, Features, FeatureSet, Trace
 from graspsense.plugins.features.contact_curve import (
+    LEAST_SAMPLES,
+    UNRESOLVED,
     CurveSamples,
     contact_curve,
     features_of,
@@ -28,7 +30,6 @@ Floats = NDArray[np.float64]
 
 POINTS: Final = 128
 """Number of times at which gap and forces are evaluated."""
-LEAST_SAMPLES: Final = 3
 CHANNELS: Final = (
     ("gap", "m", "gap"),
     ("high_force", "N", "force of the pad with the larger force"),
@@ -85,7 +86,7 @@ class QuantileFeatures(FeatureSet[ContactThreshold]):
         lost_s = first_crossing(curve.t_s[last:], -curve.lowest_n[last:], -contact_force_n)
         end_s = float(curve.t_s[last]) if lost_s is None else lost_s
         values: list[float | str] = [
-            float(np.interp(start_s, samples.t_s, samples.gap_m)),
+            curve.contact_gap_m if curve.resolved else UNRESOLVED.format("rise"),
             end_s - start_s,
         ]
         inside = (samples.t_s >= start_s) & (samples.t_s <= end_s)

@@ -90,7 +90,7 @@ def opened_bag(path: Path, definitions: Mapping[str, str] | None = None) -> Iter
     for file in files:
         refuse_devices(file)
         with readable(file):
-            if file.is_file() and _is_sqlite(file):
+            if file.is_file():
                 _refuse_views(file)
     size = sum(file.stat().st_size for file in files)
     with _unpacking_within(Unpacked(path)):
@@ -157,14 +157,12 @@ class Definitions:
         return True
 
 
-def _is_sqlite(file: Path) -> bool:
-    with file.open("rb") as opened:
-        return opened.read(len(_SQLITE)) == _SQLITE
-
-
 def _refuse_views(source: str | Path, content: bytes | None = None) -> None:
     """Raise DataDamaged if a SQLite file, or this content of one, has anything but plain tables and indices."""
     if content is None:
+        with Path(source).open("rb") as opened:
+            if opened.read(len(_SQLITE)) != _SQLITE:
+                return
         uri = f"file:{quote(str(Path(source).absolute()))}?mode=ro&immutable=1"
         connection = sqlite3.connect(uri, uri=True)
     else:

@@ -82,13 +82,9 @@ def _named_by(
         for number, labelled in enumerate(readable_or_not(kind, place), 1):
             if isinstance(labelled, UnreadableRecording):
                 yield labelled
-                continue
-            try:
-                known = _relabelled(labelled, label)
-            except ConfigError as error:
-                yield UnreadableRecording(source=labelled.source, error=error)
-                continue
-            yield ImportedRecording(source=source, name=f"{kind}:{place}#{number}", labelled=known)
+            else:
+                name = f"{kind}:{place}#{number}"
+                yield from each_readable(labelled.source, partial(_imported, source, name, labelled, label))
         return
     ending = Path(source).suffix.lower()
     name = f"csv:{named(source, columns)}" if is_csv(source) else source
@@ -96,8 +92,7 @@ def _named_by(
         name = f"{KIND_OF[ending]}:{source}"
     kind, file = kind_and_name(name)
     if is_recording_number(kind, file):
-        numbered = numbered_recording(kind, file)
-        yield ImportedRecording(source=source, name=name, labelled=_relabelled(numbered, label))
+        yield from _imported(source, name, numbered_recording(kind, file), label)
         return
     if kind not in KINDS:
         kinds = ", ".join(f"{known}:" for known in known_kinds())
@@ -108,7 +103,7 @@ def _named_by(
             f"{folder if Path(source).is_dir() else ''}"
         )
     recording = with_notices(LabelledRecording(recording=read_named(kind, file), source=source))
-    yield ImportedRecording(source=source, name=name, labelled=_relabelled(recording, label))
+    yield from _imported(source, name, recording, label)
 
 
 def _dataset(source: str) -> tuple[str, str] | None:
@@ -121,11 +116,12 @@ def _dataset(source: str) -> tuple[str, str] | None:
     return (kind, place) if kind not in KINDS or Path(os.path.expanduser(place)).is_dir() else None
 
 
-def _relabelled(labelled: LabelledRecording, label: str | None) -> LabelledRecording:
-    """Return the recording with the label that a user gave for all. Raises ConfigError if either is not a label."""
-    if label is None:
-        if labelled.label:
-            labels_of(labelled.label)
-        return labelled
-    given = labels_of(label)
-    return evolve(labelled, label=given["label"], instance=given.get("instance", "").partition("#")[2])
+def _imported(
+    source: str, name: str, labelled: LabelledRecording, label: str | None
+) -> tuple[ImportedRecording]:
+    """Return a recording with the label that a user gave for all. Raises ConfigError if it, or its own, is none."""
+    given = labels_of(label or labelled.label) if label is not None or labelled.label else {}
+    if label is not None:
+        instance = given.get("instance", "").partition("#")[2]
+        labelled = evolve(labelled, label=given["label"], instance=instance)
+    return (ImportedRecording(source=source, name=name, labelled=labelled),)

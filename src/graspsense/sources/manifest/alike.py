@@ -1,7 +1,7 @@
-"""Whether some of the grasps of a file are unlike the others, as where a zero or a gain changed between them.
+"""Whether some of the grasps of a file are unlike the others, as where a zero, a gain or the clock changed in between.
 
-What such grasps have alike is compared: how far the fingers open, which share of the force each pad bears, and the
-force at a gap that all reach. Nothing in a single grasp shows that one of these is wrong.
+What such grasps have alike is compared: how far apart samples are in time, how far the fingers open, which share of the
+force each pad bears, and the force at a gap that all reach. Nothing in a single grasp shows that one of these is wrong.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ APART: Final = 4.0
 OPENING: Final = 0.05
 SHARE: Final = 0.06
 RATIO: Final = 1.4
-"""and by this share of the range of the gap, by this share of the force of both pads, or by this ratio of forces."""
+"""and by this share of the range of the gap, this share of the force of both pads, or this ratio of forces or times."""
 
 
 def compared(
@@ -49,9 +49,13 @@ def compared(
 def _notices(grasps: Sequence[LabelledRecording]) -> list[list[str]]:
     """Return the notices of each grasp."""
     signals = [grasp.recording.columns("gap_m", "force_left_n", "force_right_n") for grasp in grasps]
+    periods = [float(np.median(np.diff(grasp.recording.columns("t_s")[0]))) for grasp in grasps]
     loaded = [shares_under_load(left, right) for _, left, right in signals]
     shares = [float(np.median(of_right)) if len(of_right) else math.nan for of_right in loaded]
-    unlike = {"the right pad bears another share of the force": _apart(shares, SHARE)}
+    unlike = {
+        "the samples are further apart in time, or closer,": _apart(np.log(periods), math.log(RATIO)),
+        "the right pad bears another share of the force": _apart(shares, SHARE),
+    }
     if not any(grasp.recording.units.get("gap") == NO_GAP for grasp in grasps):
         low, high = np.array([usual_range(gap) for gap, *_ in signals]).T
         unlike["the fingers open to another gap"] = _apart(high, OPENING * float(np.median(high - low)))
@@ -60,7 +64,7 @@ def _notices(grasps: Sequence[LabelledRecording]) -> list[list[str]]:
             unlike["the force is another one at the same gap"] = _apart(np.log(forces), math.log(RATIO))
     return [
         [
-            f"{what} than in most grasps of the file: did a zero or a gain change, or is it another object?"
+            f"{what} than in most grasps of the file: did a zero, a gain or the clock change, or is it another object?"
             for what, which in unlike.items()
             if which[k]
         ]

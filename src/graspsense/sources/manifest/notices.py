@@ -128,7 +128,7 @@ def _of_gap(columns: GraspColumns) -> Iterator[str]:
     if span > 0.0 and (pressed - began > 0.2 * span or pressed - touched > PART * span):
         yield (
             "the gap rises while the force rises: is it a position that grows on closing? Write the gap as a "
-            f'difference: gap = "{_opening(gap):g} - POSITION"'
+            f'difference: gap = "{max(1, math.ceil(float(gap.max()) * 10.0)) / 10.0:g} - POSITION"'
         )
 
 
@@ -276,8 +276,3 @@ def _has_several_squeezes(columns: GraspColumns) -> bool:
         return len(squeezes(columns)) > 1
     except DataDamaged:
         return False
-
-
-def _opening(position: Numbers) -> float:
-    """Return an opening (m) from which a position can be subtracted, in steps of 0.1 m."""
-    return max(1, math.ceil(float(position.max()) * 10.0)) / 10.0

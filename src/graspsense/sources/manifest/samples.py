@@ -45,7 +45,7 @@ def samples(manifest: ReadManifest, table: ColumnTable) -> GraspColumns:
     if not len(table):
         raise DataDamaged(f"{table.source} has no rows")
     notes = [f"{len(table)} samples of {table.source}", *table.notes]
-    t_s, origin_s, time_notes = _times(available)
+    t_s, origin_s, clock, time_notes = _times(available)
     notes += time_notes
     events = labelled_events(available, t_s, origin_s)
     notes += [
@@ -90,7 +90,7 @@ def samples(manifest: ReadManifest, table: ColumnTable) -> GraspColumns:
             **units,
             "gap": gap[1],
             "force": unit,
-            "t": "" if _has_time(available) else "sample",
+            "t": clock,
         },
         notes=tuple(notes),
         warnings=(*table.warnings, *_doubts(available, t_s, gap[0], (left_n, right_n))),
@@ -250,13 +250,8 @@ def _assumed(columns: AvailableColumns) -> Iterator[str]:
         yield f"no unit is stated, so these are read as they are: {words}"
 
 
-def _has_time(columns: AvailableColumns) -> bool:
-    named = any(map(columns.has, columns.manifest.expressions["time"]))
-    return named or bool(columns.manifest.keys.rate_hz) or columns.table.t_s is not None
-
-
-def _times(columns: AvailableColumns) -> tuple[Numbers, float, tuple[str, ...]]:
-    """Return the time of each row (s), what was subtracted from it, and what was chosen for it, in words.
+def _times(columns: AvailableColumns) -> tuple[Numbers, float, str, tuple[str, ...]]:
+    """Return the time of each row, what was subtracted from it, its unit, empty for s, and what was chosen, in words.
 
     Raises ConfigError.
     """
@@ -266,14 +261,14 @@ def _times(columns: AvailableColumns) -> tuple[Numbers, float, tuple[str, ...]]:
     if given is not None and chosen is not None:
         unit, origin = columns.since_1970(chosen), _origin(given[0])
         told = unit and unit == columns.unit(chosen, "time")
-        return given[0] - origin, origin, (f"the time is in {unit} since 1970",) if told else ()
+        return given[0] - origin, origin, "", (f"the time is in {unit} since 1970",) if told else ()
     if table.t_s is not None:
         origin = _origin(table.t_s)
-        return table.t_s - origin, origin, ()
+        return table.t_s - origin, origin, "", ()
     if manifest.keys.rate_hz:
-        return np.arange(len(table)) / manifest.keys.rate_hz, 0.0, ()
+        return np.arange(len(table)) / manifest.keys.rate_hz, 0.0, "", ()
     if len(table) == 1:
-        return np.zeros(1), 0.0, ()
+        return np.zeros(1), 0.0, "sample", ()
     raise ConfigError(
         f'{manifest.place}: {table.source} has no time: write time = "COLUMN [ms]", or rate_hz = 100 where there is no '
         f"such column. Columns: {listed(tuple(table.numbers))}"

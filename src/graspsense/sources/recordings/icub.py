@@ -24,6 +24,7 @@ from attrs import frozen
 
 from graspsense.core.values.errors import ConfigError, DataDamaged, suggestion
 from graspsense.core.values.fingers import PREFIX, FingerForce
+from graspsense.core.values.written_numbers import number_in
 from graspsense.recording.replayable import Recording
 from graspsense.sources.columns.grasp_columns import GraspColumns, checked_recording, finger_sides
 from graspsense.sources.formats.table import Numbers
@@ -121,11 +122,10 @@ def read_grasp(path: Path) -> IcubGrasp:
     """
     text = text_of(path)
     lines = text.splitlines()
-    if not lines:
-        raise DataDamaged(f"{path} is empty: a grasp of the iCub data set starts with the line {FIRST_LINE}")
+    begin = lines[0] if lines else ""
     frames, left_over = divmod(len(lines) - 1, len(_LINES))
-    if lines[0].strip() != FIRST_LINE:
-        begins = f"it starts with {lines[0][:40]!r}, but a grasp starts with the line {FIRST_LINE}"
+    if begin.strip() != FIRST_LINE:
+        begins = f"it starts with {begin[:40]!r}, but a grasp starts with the line {FIRST_LINE}"
         raise _damaged(path, 1, begins)
     if not text.endswith("\n"):
         raise _damaged(path, len(lines), "the file ends within this line: download it again")
@@ -151,14 +151,11 @@ def _locate(name: str) -> Path:
         raise ConfigError(
             f"{given} is a folder: name a grasp in it, such as {given}/full_vitamin_water_1.txt"
         )
-    folder = next((f for f in (given.parent / DATA_FOLDER, given.parent) if f.is_dir()), None)
-    if folder is None:
-        raise ConfigError(f"no file {given}: there is no folder {given.parent}")
+    folder = given.parent / DATA_FOLDER if (given.parent / DATA_FOLDER).is_dir() else given.parent
     grasps = [p.name for p in folder.glob("*.txt")]
-    near = suggestion(given.name, grasps)
-    raise ConfigError(
-        f"no file {given}: {folder} contains {len(grasps)} files *.txt, but none with this name.{near}"
-    )
+    there = f"{folder} contains {len(grasps)} files *.txt, but none with this name"
+    there = there if folder.is_dir() else f"there is no folder {folder}"
+    raise ConfigError(f"no file {given}: {there}.{suggestion(given.name, grasps)}")
 
 
 def _numbers(path: Path, number: int, line: str, what: str, count: int) -> list[float]:
@@ -168,10 +165,9 @@ def _numbers(path: Path, number: int, line: str, what: str, count: int) -> list[
     lowest, highest = (-_FULL_TURN_DEG, _FULL_TURN_DEG) if what == "encoder" else (0.0, _FULL_SCALE)
     values = []
     for word in words:
-        try:
-            value = float(word)
-        except ValueError:
-            raise _damaged(path, number, f"{what} value {word[:40]!r} is not a number") from None
+        value = number_in(word)
+        if value is None:
+            raise _damaged(path, number, f"{what} value {word[:40]!r} is not a number")
         if not lowest <= value <= highest:
             raise _damaged(path, number, f"{what} value {word[:40]} is outside {lowest:g} to {highest:g}")
         values.append(value)
