@@ -338,44 +338,47 @@ def test_the_calibrations_of_a_gripper_count_with_and_without_their_setting(tmp_
         assert_counts(folder / "tare.json", {"gripper": {"calibration": given}})
 
 
-def test_the_code_of_a_plugin_and_its_version_count(tmp_path, monkeypatch):
-    (tmp_path / "my_plugin").mkdir()
-    law = tmp_path / "my_plugin" / "law.py"
-    law.write_text("a = 1")
-    monkeypatch.syspath_prepend(tmp_path)
+LAW = """
+import helper
+from helpers.law import a
+weights = [Path(__file__).parents[2] / "data" / "weights.txt", "near.txt", os.environ["LAB_WEIGHTS"]]
+late = import_module("lab_late"), os.environ.get("LAB_SCALE")
+"""
 
-    def content(version):
+
+def test_the_code_of_a_plugin_counts_with_what_it_imports_and_names(tmp_path, monkeypatch):
+    source, library = tmp_path / "project" / "src", tmp_path / "library"
+    inputs = (
+        *(source / name for name in ("my_plugin/law.py", "helper.py", "helpers/law.py", "near.txt")),
+        *(library / name for name in ("lab_late.py", "lab_deep/__init__.py")),
+        *(tmp_path / name for name in ("project/data/weights.txt", "weights.txt")),
+    )
+    written = (inputs[0], LAW), (inputs[1], "import lab_deep, attrs, lab_lost"), (source / "other.py", "")
+    for path, text in (*((path, "") for path in inputs), *written):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    monkeypatch.setenv("LAB_WEIGHTS", str(inputs[-1]))
+    for place in (source, library):
+        monkeypatch.syspath_prepend(place)
+
+    def content(version="1.0"):
         input_content._hash_of_code.cache_clear()  # as in another process
         return input_content._hash_of_code(version, "my_plugin.law")
 
-    known = [content("1.0")]
-    assert content("1.0") in known
+    known = [content()]
+    (source / "other.py").write_text("a = 1")  # which nothing imports
+    assert content() in known
     assert content("1.1") not in known
-    for changed in (law, tmp_path / "helper.py", tmp_path / "helpers" / "__init__.py"):
-        changed.parent.mkdir(exist_ok=True)
-        changed.write_text("a = 22")
-        assert content("1.0") not in known
-        known.append(content("1.0"))
+    for changed in inputs:
+        changed.write_text(f"{changed.read_text()}\n# changed")
+        assert content() not in known, changed
+        known.append(content())
+    monkeypatch.setenv("LAB_SCALE", "2")
+    assert content() not in known
     developed = input_content.developed_code("my_plugin.law")
-    law.write_text("a = 333")
+    inputs[0].write_text("a = 333")
     assert input_content.developed_code("my_plugin.law") not in ("", developed)
     assert input_content.developed_code("attrs.anything") == ""
-
-
-def test_the_code_of_a_library_that_is_developed_beside_its_plugin_counts(tmp_path, monkeypatch):
-    about = tmp_path / "plugin" / "lab_plugin-1.0.dist-info" / "METADATA"
-    about.parent.mkdir(parents=True)
-    needs = "".join(f"Requires-Dist: {name}\n" for name in ("lab-law", "attrs", "lab-lost", "graspsense"))
-    about.write_text(f"Metadata-Version: 2.1\nName: lab-plugin\nVersion: 1.0\n{needs}")
-    (tmp_path / "library" / "lab_law").mkdir(parents=True)
-    (tmp_path / "library" / "lab_law" / "__init__.py").write_text("a = 1")
-    for place in ("plugin", "library"):
-        monkeypatch.syspath_prepend(tmp_path / place)
-    assert input_content._developed_libraries("lab-plugin") == ["lab_law"]
-    assert "lab_law" not in input_content._developed_libraries("graspsense")
-    part = next(part for part in installed().components() if part.qualified == "graspsense/knn")
-    monkeypatch.setattr(input_content, "_developed_libraries", lambda distribution: ["lab_law"])
-    assert ("", "lab_law") in input_content._codes()[part.qualified]
 
 
 def test_the_components_of_a_task_are_inputs(tmp_path):
