@@ -347,36 +347,32 @@ late = import_module("lab_late"), os.environ.get("LAB_SCALE")
 
 
 def test_the_code_of_a_plugin_counts_with_what_it_imports_and_names(tmp_path, monkeypatch):
-    source, library = tmp_path / "project" / "src", tmp_path / "library"
-    inputs = (
-        *(source / name for name in ("my_plugin/law.py", "helper.py", "helpers/law.py", "near.txt")),
-        *(library / name for name in ("lab_late.py", "lab_deep/__init__.py")),
-        *(tmp_path / name for name in ("project/data/weights.txt", "weights.txt")),
-    )
-    written = (inputs[0], LAW), (inputs[1], "import lab_deep, attrs, lab_lost"), (source / "other.py", "")
-    for path, text in (*((path, "") for path in inputs), *written):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text)
-    monkeypatch.setenv("LAB_WEIGHTS", str(inputs[-1]))
-    for place in (source, library):
-        monkeypatch.syspath_prepend(place)
+    texts = dict.fromkeys(["src/helpers/law.py", "src/near.txt", "data/weights.txt", "far.txt"], "")
+    texts |= {"src/my_plugin/law.py": LAW, "src/helper.py": "import lab_deep, attrs, lab_lost"}
+    texts |= {"library/lab_late.py": "", "library/lab_deep/__init__.py": ""}
+    for name, text in texts.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    monkeypatch.setenv("LAB_WEIGHTS", str(tmp_path / "far.txt"))
+    for place in ("src", "library"):
+        monkeypatch.syspath_prepend(tmp_path / place)
 
     def content(version="1.0"):
         input_content._hash_of_code.cache_clear()  # as in another process
         return input_content._hash_of_code(version, "my_plugin.law")
 
     known = [content()]
-    (source / "other.py").write_text("a = 1")  # which nothing imports
+    (tmp_path / "src" / "other.py").write_text("a = 1")  # which nothing imports
     assert content() in known
     assert content("1.1") not in known
-    for changed in inputs:
-        changed.write_text(f"{changed.read_text()}\n# changed")
-        assert content() not in known, changed
+    for name, text in texts.items():
+        (tmp_path / name).write_text(f"{text}\n# changed")
+        assert content() not in known, name
         known.append(content())
     monkeypatch.setenv("LAB_SCALE", "2")
     assert content() not in known
     developed = input_content.developed_code("my_plugin.law")
-    inputs[0].write_text("a = 333")
+    (tmp_path / "src" / "my_plugin" / "law.py").write_text("a = 333")
     assert input_content.developed_code("my_plugin.law") not in ("", developed)
     assert input_content.developed_code("attrs.anything") == ""
 

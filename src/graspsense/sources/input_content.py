@@ -169,13 +169,9 @@ def _hash_of_code(version: str, module: str) -> str:
     developed = [os.path.dirname(place) for place in code if _is_developed(place)]
     folders = {os.curdir, *developed, *map(os.path.dirname, developed)}
     files = _files_in(folders, {*texts, *(f"{text}.py" for text in texts)})
-    known = set[str]()
-    for file in files:
-        _named_files(file, (), known)
-    inside = tuple(os.path.join(place, "") for place in code)
-    outside = sorted(file for file in {*files, *known} if not file.startswith(inside))
+    named = sorted(files.union(*(_named_files(file, (), set()) for file in files)))
     values = [f"{name}={value}" for name, value in sorted(variables.items())]
-    return _hash([version, *map(_hash_of_tree, (*code, *outside)), *values])
+    return _hash([version, *map(_hash_of_tree, (*code, *named)), *values])
 
 
 def _code_of(package: str) -> dict[str, set[str]]:
@@ -297,13 +293,11 @@ def _named_files(path: str, folders: tuple[str, ...], known: set[str]) -> set[st
         return known
     texts = _texts_in(path)
     folder = os.path.dirname(path)
-    folders += (folder, *(place for text in texts if os.path.isdir(place := os.path.join(folder, text))))
-    places = {os.path.join(name, os.path.expanduser(text)) for name in folders for text in texts}
-    places |= {place for text in texts for place in _places_in_package(text)}
-    for place in sorted(places - known - {path}):
-        if os.path.isfile(place):
-            known.add(place)
-            _named_files(place, folders, known)
+    folders += (folder, *filter(os.path.isdir, _present(folder, texts)))
+    packaged = (place for text in texts for place in _places_in_package(text) if os.path.isfile(place))
+    for place in sorted({*_files_in(folders, texts), *packaged} - known - {path}):
+        known.add(place)
+        _named_files(place, folders, known)
     return known
 
 
