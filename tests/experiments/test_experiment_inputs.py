@@ -338,44 +338,43 @@ def test_the_calibrations_of_a_gripper_count_with_and_without_their_setting(tmp_
         assert_counts(folder / "tare.json", {"gripper": {"calibration": given}})
 
 
-def test_the_code_of_a_plugin_and_its_version_count(tmp_path, monkeypatch):
-    (tmp_path / "my_plugin").mkdir()
-    law = tmp_path / "my_plugin" / "law.py"
-    law.write_text("a = 1")
-    monkeypatch.syspath_prepend(tmp_path)
+LAW = """
+import helper
+from helpers.law import a
+weights = [Path(__file__).parents[2] / "data" / "weights.txt", "near.txt", os.environ["LAB_WEIGHTS"]]
+late = import_module("lab_late"), os.environ.get("LAB_SCALE")
+"""
 
-    def content(version):
+
+def test_the_code_of_a_plugin_counts_with_what_it_imports_and_names(tmp_path, monkeypatch):
+    texts = dict.fromkeys(["src/helpers/law.py", "src/near.txt", "data/weights.txt", "far.txt"], "")
+    texts |= {"src/my_plugin/law.py": LAW, "src/helper.py": "import lab_deep, attrs, lab_lost"}
+    texts |= {"library/lab_late.py": "", "library/lab_deep/__init__.py": ""}
+    for name, text in texts.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    monkeypatch.setenv("LAB_WEIGHTS", str(tmp_path / "far.txt"))
+    for place in ("src", "library"):
+        monkeypatch.syspath_prepend(tmp_path / place)
+
+    def content(version="1.0"):
         input_content._hash_of_code.cache_clear()  # as in another process
         return input_content._hash_of_code(version, "my_plugin.law")
 
-    known = [content("1.0")]
-    assert content("1.0") in known
+    known = [content()]
+    (tmp_path / "src" / "other.py").write_text("a = 1")  # which nothing imports
+    assert content() in known
     assert content("1.1") not in known
-    for changed in (law, tmp_path / "helper.py", tmp_path / "helpers" / "__init__.py"):
-        changed.parent.mkdir(exist_ok=True)
-        changed.write_text("a = 22")
-        assert content("1.0") not in known
-        known.append(content("1.0"))
+    for name, text in texts.items():
+        (tmp_path / name).write_text(f"{text}\n# changed")
+        assert content() not in known, name
+        known.append(content())
+    monkeypatch.setenv("LAB_SCALE", "2")
+    assert content() not in known
     developed = input_content.developed_code("my_plugin.law")
-    law.write_text("a = 333")
+    (tmp_path / "src" / "my_plugin" / "law.py").write_text("a = 333")
     assert input_content.developed_code("my_plugin.law") not in ("", developed)
     assert input_content.developed_code("attrs.anything") == ""
-
-
-def test_the_code_of_a_library_that_is_developed_beside_its_plugin_counts(tmp_path, monkeypatch):
-    about = tmp_path / "plugin" / "lab_plugin-1.0.dist-info" / "METADATA"
-    about.parent.mkdir(parents=True)
-    needs = "".join(f"Requires-Dist: {name}\n" for name in ("lab-law", "attrs", "lab-lost", "graspsense"))
-    about.write_text(f"Metadata-Version: 2.1\nName: lab-plugin\nVersion: 1.0\n{needs}")
-    (tmp_path / "library" / "lab_law").mkdir(parents=True)
-    (tmp_path / "library" / "lab_law" / "__init__.py").write_text("a = 1")
-    for place in ("plugin", "library"):
-        monkeypatch.syspath_prepend(tmp_path / place)
-    assert input_content._developed_libraries("lab-plugin") == ["lab_law"]
-    assert "lab_law" not in input_content._developed_libraries("graspsense")
-    part = next(part for part in installed().components() if part.qualified == "graspsense/knn")
-    monkeypatch.setattr(input_content, "_developed_libraries", lambda distribution: ["lab_law"])
-    assert ("", "lab_law") in input_content._codes()[part.qualified]
 
 
 def test_the_components_of_a_task_are_inputs(tmp_path):

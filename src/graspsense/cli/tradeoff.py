@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 import click
+from attrs import asdict
 
 from graspsense.cli.experiment import experiment
 from graspsense.cli.options import pipeline_options, settings_of
@@ -73,7 +74,7 @@ def simulation(
         made = Section(id="made", title="Provenance", body=facts(list(trade.made.items())))
         sections, title = (table.section(), made), f"Accuracy of {trade.gripper} against its run time"
         write_html(page, Page(kind="Trade-off", title=title, answer=words or table.note, sections=sections))
-    echo_values({**trade.as_json(), "page": None if page is None else str(page)})
+    echo_values({**asdict(trade), "page": None if page is None else str(page)})
     echo(f"{trade.gripper}, simulated. {table.note}")
     echo(f"{', '.join(f'{key} {value}' for key, value in trade.made.items())}\n")
     echo_found(table)

@@ -110,7 +110,7 @@ class CasePlan:
             sources = [source for source in (case.data, case.test) if source is not None]
             if self.complaints or not sources:
                 return
-            inert = set.intersection(*(set(_without_effect(source)) for source in sources))
+            inert = set.intersection(*map(_without_effect, sources))
             named = " and ".join(source.source for source in sources)
             keys = [dotted(path) for path in sweep if {path[0], dotted(path[:2])} & inert]
             twin = seen.setdefault(_what_matters(case, inert), case)
@@ -303,9 +303,9 @@ class CasePlan:
                 yield LearnerSpec(name=name, type=component.qualified, config=config)
 
 
-def _without_effect(source: TrialSource) -> list[str]:
+def _without_effect(source: TrialSource) -> set[str]:
     """Return the tables, and the keys of [data], that the trials of a source do not depend on."""
-    return [*tables_without_effect(source), *(f"data.{key}" for key in keys_without_effect(source))]
+    return {*tables_without_effect(source), *(f"data.{key}" for key in keys_without_effect(source))}
 
 
 def _what_matters(case: ExperimentCase, inert: set[str]) -> str:

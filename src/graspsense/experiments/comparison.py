@@ -117,9 +117,7 @@ class ExperimentComparison:
                     "case": difference.other.name,
                     "target": difference.other.target,
                     "difference": difference.difference.value,
-                    "interval": None
-                    if difference.difference.interval is None
-                    else list(difference.difference.interval),
+                    "interval": difference.difference.interval,
                     "how": difference.how,
                     "verdict": difference.verdict,
                 }

@@ -7,10 +7,10 @@ import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from attrs import asdict, evolve, field, frozen
+from attrs import evolve, field, frozen
 
 from graspsense.core.components.roles import BatchBackend, Grasped, SimulationVariant
 from graspsense.core.values.errors import ConfigError, counted, named
@@ -77,10 +77,6 @@ class SimulationTrade:
     quantities: tuple[str, ...]
     points: tuple[VariantPoint, ...]
     made: Mapping[str, str]
-
-    def as_json(self) -> dict[str, Any]:
-        """Return the trade-off as values for JSON."""
-        return asdict(self)
 
 
 def simulation_table(trade: SimulationTrade) -> FoundTable:

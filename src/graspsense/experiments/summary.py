@@ -255,10 +255,8 @@ class Summary:
                     "n": condition.rate.n,
                     "rates": {str(seed): rate for seed, rate in condition.rates.items()},
                     "rate": condition.rate.mean,
-                    "interval": None if condition.rate.interval is None else list(condition.rate.interval),
-                    "prediction_interval": None
-                    if condition.rate.prediction is None
-                    else list(condition.rate.prediction),
+                    "interval": condition.rate.interval,
+                    "prediction_interval": condition.rate.prediction,
                     "warnings": list(condition.of_first_seed.warnings),
                     "notes": list(condition.of_first_seed.notes),
                 }

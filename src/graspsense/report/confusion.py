@@ -63,7 +63,8 @@ def confusion_table(confusion: Confusion, caption: str) -> str:
         cells = []
         for j, count in enumerate(row):
             share = count / total
-            kinds = [*([f"q{_shade(share)}"] if count else []), *(["right"] if i == j else [])]
+            # The colours in `page.css` are numbered from 1 to 8.
+            kinds = [*([f"q{math.ceil(8 * share)}"] if count else []), *(["right"] if i == j else [])]
             kind = f' class="{" ".join(kinds)}"' if kinds else ""
             cells.append(f"<td{kind}>{count if count else '·'}</td>")
         body.append(
@@ -76,8 +77,3 @@ def confusion_table(confusion: Confusion, caption: str) -> str:
         f'<table class="matrix"><thead><tr><td></td>{head}<th scope="col"><span>right</span></th></tr></thead>'
         f"<tbody>{''.join(body)}</tbody></table>",
     )
-
-
-def _shade(share: float) -> int:
-    """Return the number of the colour in `page.css` for a share above 0: 1 to 8."""
-    return min(max(math.ceil(8 * share), 1), 8)

@@ -87,14 +87,15 @@ def inline(text: str) -> str:
 _CODE: Final = re.compile("`([^`\n]+)`")
 
 
-def paragraph(text: str, kind: str = "") -> str:
+def paragraph(text: str) -> str:
     """Return a paragraph of plain text."""
-    return f"<p{_class(kind)}>{inline(text)}</p>"
+    return f"<p>{inline(text)}</p>"
 
 
 def bullets(items: Sequence[str], kind: str = "") -> str:
     """Return a list of plain texts; an empty text if there are none."""
-    return f"<ul{_class(kind)}>{''.join(f'<li>{inline(item)}</li>' for item in items)}</ul>" if items else ""
+    marked_as = f' class="{kind}"' if kind else ""
+    return f"<ul{marked_as}>{''.join(f'<li>{inline(item)}</li>' for item in items)}</ul>" if items else ""
 
 
 def figure(picture: str, caption: str) -> str:
@@ -193,10 +194,6 @@ def code(text: str, label: str = "text") -> str:
 def facts(pairs: Sequence[tuple[str, str]]) -> str:
     """Return a description list from pairs of a term and its description."""
     return f"<dl>{''.join(f'<dt>{escape(k)}</dt><dd>{inline(v)}</dd>' for k, v in pairs)}</dl>"
-
-
-def _class(kind: str) -> str:
-    return f' class="{kind}"' if kind else ""
 
 
 @cache

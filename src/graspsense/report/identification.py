@@ -35,6 +35,7 @@ def identification_page(result: Identification, scene: str) -> Page:
     relative = [fit.residual for fit in result.fits]
     chosen = next(candidate.terms for candidate in result.candidates if candidate.chosen)
     what = result.label or "the object"
+    held_out = f"Held out: {held_out_in_words(result.held_out)}. " if result.held_out else ""
     parameters, candidates, undetermined = identification_tables(result)
     return Page(
         kind="Identified object",
@@ -43,7 +44,7 @@ def identification_page(result: Identification, scene: str) -> Page:
         headline=f"{what}: {chosen}",
         answer=(
             f"{len(result.fits)} squeezes, fitted to {100.0 * float(np.mean(relative)):.2g} % of the peak force (rms). "
-            f"{_differ(result.fits)}{_held_out(result.held_out)}The scene is {scene}."
+            f"{_differ(result.fits)}{held_out}The scene is {scene}."
         ),
         beside=bullets(result.refusals, "warning") + bullets(result.notes),
         sections=(
@@ -61,10 +62,6 @@ def _differ(fits: Sequence[SqueezeFit]) -> str:
     if len(fits) < 2:
         return ""
     return f"Among themselves, the squeezes differ by {100.0 * repeatability(fits):.2g} % of the peak. "
-
-
-def _held_out(errors: Sequence[float]) -> str:
-    return f"Held out: {held_out_in_words(errors)}. " if errors else ""
 
 
 def identification_tables(result: Identification) -> tuple[FoundTable, FoundTable, FoundTable]:

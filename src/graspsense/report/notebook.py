@@ -42,7 +42,7 @@ def html(value: object) -> str:
         case Trial():
             return trial_html(value)
         case Trace():
-            return trace_html(value)
+            return sentence(value.words) + _pictures(value, ())
         case Features():
             return features_html(value)
         case Prediction():
@@ -91,11 +91,6 @@ def trial_html(trial: Trial) -> str:
     components = ", ".join(trial.run.components.values())
     parts.append(sentence(f"{trial.device.name}, seed {trial.run.seed}: {components}"))
     return "".join(parts)
-
-
-def trace_html(trace: Trace) -> str:
-    """Return a trace in words, its curves and its arrays."""
-    return sentence(trace.words) + _pictures(trace, ())
 
 
 def _pictures(trace: Trace, channels: Sequence[Channel]) -> str:

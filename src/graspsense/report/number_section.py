@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from typing import Final
 
@@ -140,7 +141,8 @@ def number_section(evaluation: RegressionEvaluation) -> Section:
             table(errors.title, errors.header, rows, errors.numbers) + bullets(not_measured(evaluation)),
         )
     )
-    return Section(id=f"number-{_identifier(name)}", title=f"Predicted number: {name}", body=body)
+    identifier = re.sub("[^a-z0-9]", "-", name.lower())
+    return Section(id=f"number-{identifier}", title=f"Predicted number: {name}", body=body)
 
 
 def _scatter(evaluation: RegressionEvaluation) -> str:
@@ -156,9 +158,3 @@ def _scatter(evaluation: RegressionEvaluation) -> str:
             picture.mark(x(truth), y(predicted), INKS[0], words=words)
     caption = "Each mark is a grasp that was held out from training. The line is where both are equal."
     return figure(picture.svg(f"Predicted and true {evaluation.target_value}. {caption}"), caption)
-
-
-def _identifier(name: str) -> str:
-    return "".join(
-        character if character.isalnum() and character.isascii() else "-" for character in name.lower()
-    )

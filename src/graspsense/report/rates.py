@@ -69,13 +69,15 @@ def rate_axis_title(scale: AxisScale) -> str:
 
 
 def draw_breaks(picture: Picture, scale: AxisScale, x: float, y: float, *, upright: bool) -> None:
-    """Mark the ends at which a rate axis is cut; `x` or `y` is where the axis lies."""
+    """Mark the ends at which a rate axis is cut by two slashes across it; `x` or `y` is where the axis lies."""
     for end, place, cut in ((0, scale.start, scale.low > 0.0), (1, scale.end, scale.high < 100.0)):
         if cut:
             shift = 5.0 * (1 if end else -1)
             # Within the upper end of an upright axis, above which its title stands.
-            point = (x, place + 5.0) if upright else (place + shift, y)
-            picture.break_mark(*point, upright=upright)
+            across, down = (x, place + 5.0) if upright else (place + shift, y)
+            for offset in (-2.5, 2.5):
+                left, top = (across, down + offset) if upright else (across + offset, down)
+                picture.line([(left - 4, top + 4), (left + 4, top - 4)], QUIET, width=1.4)
 
 
 def rates_picture(rows: Sequence[RateRow], caption: str) -> str:

@@ -205,12 +205,6 @@ class Picture:
         with self.plot(x, y, y.end, y.start):
             yield
 
-    def break_mark(self, x: float, y: float, *, upright: bool) -> None:
-        """Mark the end at which an axis is cut by two slashes across it."""
-        for offset in (-2.5, 2.5):
-            dx, dy = (0.0, offset) if upright else (offset, 0.0)
-            self.line([(x - 4 + dx, y + 4 + dy), (x + 4 + dx, y - 4 + dy)], QUIET, width=1.4)
-
     def svg(self, words: str, unit: str = "") -> str:
         """Return the picture; `words` say what it shows, `unit` is that of the horizontal axis for values read out."""
         read_out = f' data-unit="{escape(unit)}"' if unit else ""

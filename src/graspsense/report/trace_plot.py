@@ -111,17 +111,12 @@ def draw_trace(trace: Trace, force: Any, gap: Any, fingers: Sequence[FingerForce
     gap.set_ylabel(f"gap, {shown}")
     gap.set_xlabel(f"{'time' if contact is None else 'time since contact'}, {trace.units['t']}")
     for axes in (force, gap):
-        _shade_phases(axes, t, trace.phase[start:])
+        for phase, begin, end in phase_spans(t, trace.phase[start:]):
+            axes.axvspan(begin, end, color=PHASE_COLOURS.get(phase, OTHER_PHASE), lw=0.0, zorder=0)
         axes.margins(x=0.0)
         axes.grid(color="white", lw=0.8)
         axes.set_axisbelow(True)
     _name_phases(force, t, trace.phase[start:])
-
-
-def _shade_phases(axes: Any, t: Floats, phases: Integers) -> None:
-    """Shade each phase behind the lines."""
-    for phase, begin, end in phase_spans(t, phases):
-        axes.axvspan(begin, end, color=PHASE_COLOURS.get(phase, OTHER_PHASE), lw=0.0, zorder=0)
 
 
 def _name_phases(axes: Any, t: Floats, phases: Integers) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import hashlib
 import os
 import re
+import sys
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
@@ -34,19 +35,24 @@ _CALIBRATION: Final = "calibration"
 _OF_TRIALS: Final = """SELECT id, recording, recording_bytes, sha256, label, instance, set_aside, hex("values")
     FROM trial JOIN detail ON detail.trial = id ORDER BY id"""
 _REQUIREMENT: Final = re.compile(r"([\w.-]+)(?!.*\bextra\b)")
+_IMPORTED: Final = re.compile(
+    r"^[ \t]*from[ \t]+(\w[\w.]*)|^[ \t]*import[ \t]+([\w., \t]+)|(?:import_module|__import__)\(\s*[\"'](\w[\w.]*)",
+    re.MULTILINE,
+)
+_VARIABLE: Final = re.compile("[A-Z][A-Z0-9_]+")
 _QUOTED: Final = re.compile(r"\"[^\"\n]{1,1000}\"|'[^'\n]{1,1000}'")
 
 
-def contents_of(params: Any) -> dict[str, str]:
+def contents_of(params: Any, *, code: bool = True) -> dict[str, str]:
     """Return the hash of each input that these parameters name, by the text that names it, and our own version.
 
     Parameters are JSON values. A text names an input if it is a file, if a file or folder follows its colon
-    (`store:DIR`, `identified:cup.toml,mug.toml`), or if it is the name of a component.
+    (`store:DIR`, `identified:cup.toml,mug.toml`), or, with `code`, if it is the name of a component.
     """
     contents = {FRAMEWORK: __version__}
     codes = _codes()
     for text in set(input_names(params)) - contents.keys():
-        content = _content(text, codes)
+        content = _content(text, codes) if code or text not in codes else None
         if content is not None:
             contents[text] = content
     return contents
@@ -138,7 +144,6 @@ def _codes() -> dict[str, list[tuple[str, str]]]:
         )
     for part in installed().components():
         code = [(part.version, part.entry.target.partition(":")[0]), *added.get(part.distribution, [])]
-        code += [("", name) for name in _developed_libraries(part.distribution)]
         codes.setdefault(part.qualified, []).extend(code)
         if part.distribution != FRAMEWORK:
             codes.setdefault(part.name, []).extend(code)
@@ -153,13 +158,57 @@ def _codes() -> dict[str, list[tuple[str, str]]]:
 
 @cache
 def _hash_of_code(version: str, module: str) -> str:
-    """Return a hash of a version and of all files of the package that a module is in, and of `_developed_beside`."""
+    """Return a hash of a version, of the code of a module, and of the files and environment variables that it names."""
     package = _OWN_PLUGINS if module.startswith(f"{_OWN_PLUGINS}.") else module.partition(".")[0]
     if package == FRAMEWORK:
         return version
-    places = _places_of_package(package)
-    places += [beside for place in places for beside in _developed_beside(place)]
-    return _hash([version, *map(_hash_of_tree, places)])
+    code = _code_of(package)
+    texts = set[str]().union(*code.values())
+    variables = {text: os.environ.get(text, "") for text in texts if _VARIABLE.fullmatch(text)}
+    texts.update(variables.values())
+    developed = [os.path.dirname(place) for place in code if _is_developed(place)]
+    folders = {os.curdir, *developed, *map(os.path.dirname, developed)}
+    files = _files_in(folders, {*texts, *(f"{text}.py" for text in texts)})
+    named = sorted(files.union(*(_named_files(file, (), set()) for file in files)))
+    values = [f"{name}={value}" for name, value in sorted(variables.items())]
+    return _hash([version, *map(_hash_of_tree, (*code, *named)), *values])
+
+
+def _code_of(package: str) -> dict[str, set[str]]:
+    """Return the places of a package, and of the developed ones that its code imports, each with the texts in its code.
+
+    The version of graspsense counts for its code, but for its own plugins.
+    """
+    code: dict[str, set[str]] = {}
+    left, known = [package], {package, *sys.stdlib_module_names}
+    while left:
+        name = left.pop()
+        for place in _places_of_package(name):
+            files = glob(f"{escape(place)}/**/*.py", recursive=True) if os.path.isdir(place) else [place]
+            code[place] = set[str]().union(*map(_texts_in, files)) if name != FRAMEWORK else set()
+            imported = set[str]().union(*map(_imported_in, files)) if name != FRAMEWORK else set()
+            for further in sorted(imported - known):
+                known.add(further)
+                places = _places_of_package(further)
+                if all(map(_is_developed, places)) and (further != FRAMEWORK or package == _OWN_PLUGINS):
+                    left.append(further)
+    return code
+
+
+def _files_in(folders: Iterable[str], texts: Iterable[str]) -> set[str]:
+    """Return the files with these names in these folders, and in the folders that the names lead to from there."""
+    names = [os.path.expanduser(text) for text in texts if re.search(r"\w", text)]
+    places = [path for folder in folders for path in _present(folder, names)]
+    places += [path for folder in filter(os.path.isdir, places) for path in _present(folder, names)]
+    return set(filter(os.path.isfile, places))
+
+
+def _present(folder: str, names: Iterable[str]) -> list[str]:
+    """Return the paths of those of these names that may exist, seen from a folder: most texts are no names."""
+    entries = {"", os.curdir, os.pardir}
+    with suppress(OSError):
+        entries.update(os.listdir(folder))
+    return [os.path.join(folder, name) for name in names if name.partition(os.sep)[0] in entries]
 
 
 def required_by(distribution: str) -> set[str]:
@@ -168,14 +217,6 @@ def required_by(distribution: str) -> set[str]:
     with suppress(PackageNotFoundError):
         needed = requires(distribution) or []
     return {re.sub(r"[-_.]+", "-", name[1]).lower() for name in map(_REQUIREMENT.match, needed) if name}
-
-
-@cache
-def _developed_libraries(distribution: str) -> list[str]:
-    """Return the packages that this one needs and that are developed too, in folders of their own."""
-    packages = sorted(name.replace("-", "_") for name in required_by(distribution) - {FRAMEWORK})
-    places = {package: _places_of_package(package) for package in packages}
-    return [package for package in packages if places[package] and all(map(_is_developed, places[package]))]
 
 
 def developed_code(module: str) -> str:
@@ -189,22 +230,15 @@ def developed_code(module: str) -> str:
 
 def _places_of_package(package: str) -> list[str]:
     """Return the folders of a package, or the file of a module."""
-    spec = find_spec(package)
+    spec = None
+    with suppress(ValueError):  # a module that was made in memory
+        spec = find_spec(package)
     places = [] if spec is None else spec.submodule_search_locations or [spec.origin or ""]
     return [place for place in places if os.path.exists(place)]
 
 
 def _is_developed(place: str) -> bool:
     return os.path.basename(os.path.dirname(place)) not in ("site-packages", "dist-packages")
-
-
-def _developed_beside(place: str) -> list[str]:
-    """Return the other modules and packages in the folder of a package that is developed, which may import them."""
-    if not _is_developed(place):
-        return []
-    folder = os.path.dirname(place)
-    others = {*glob(f"{escape(folder)}/*.py"), *map(os.path.dirname, glob(f"{escape(folder)}/*/__init__.py"))}
-    return sorted(others - {place})
 
 
 def _hash_of_store(folder: str) -> str:
@@ -259,25 +293,35 @@ def _named_files(path: str, folders: tuple[str, ...], known: set[str]) -> set[st
         return known
     texts = _texts_in(path)
     folder = os.path.dirname(path)
-    folders += (folder, *(place for text in texts if os.path.isdir(place := os.path.join(folder, text))))
-    places = {os.path.join(name, os.path.expanduser(text)) for name in folders for text in texts}
-    places |= {place for text in texts for place in _places_in_package(text)}
-    for place in sorted(places - known - {path}):
-        if os.path.isfile(place):
-            known.add(place)
-            _named_files(place, folders, known)
+    folders += (folder, *filter(os.path.isdir, _present(folder, texts)))
+    packaged = (place for text in texts for place in _places_in_package(text) if os.path.isfile(place))
+    for place in sorted({*_files_in(folders, texts), *packaged} - known - {path}):
+        known.add(place)
+        _named_files(place, folders, known)
     return known
 
 
 def _texts_in(path: str) -> set[str]:
     """Return the texts in a TOML file, or between quotes in another one; none of a file that cannot be read."""
-    try:
-        text = Path(path).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError):
-        return set()  # the task tells it
+    text = _text_of(path)
     with suppress(tomllib.TOMLDecodeError):
         return set(_texts(tomllib.loads(text)))
     return {unescape(quoted[1:-1]) for quoted in _QUOTED.findall(text)}
+
+
+def _imported_in(path: str) -> set[str]:
+    """Return the packages and modules that a file of code imports, but for those of its own package."""
+    statements = map("".join, _IMPORTED.findall(_text_of(path)))
+    names = (name.split() for statement in statements for name in statement.split(","))
+    return {words[0].partition(".")[0] for words in names if words}
+
+
+def _text_of(path: str) -> str:
+    """Return the text of a file, empty if it cannot be read."""
+    try:
+        return Path(path).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError):
+        return ""  # the task tells it
 
 
 def _places_in_package(text: str) -> Iterator[str]:
@@ -328,4 +372,4 @@ def _read_hash(path: str, _state: tuple[int, int, int]) -> str:
 
 
 def _hash(parts: Iterable[str]) -> str:
-    return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
+    return hashlib.sha256("\0".join(parts).encode(errors="surrogateescape")).hexdigest()[:32]

@@ -210,12 +210,14 @@ def inconsistencies(store: Store) -> dict[int, str]:
     """Return the trials whose label or state does not follow from their recording and their changes, and why."""
     labels: dict[int, str | None] = {}
     aside: dict[int, bool] = {}
+    problems: dict[int, str] = {}
     for change in history(store):
         if change.action == "relabel":
             labels[change.trial] = change.new
-        elif change.action != "value":
+        elif change.action in ("aside", "restore"):
             aside[change.trial] = change.action == "aside"
-    problems = {}
+        elif change.action != "value":
+            problems[change.trial] = f"its history has the unknown action {change.action!r}"
     columns = store.columns(("id", "label", "instance", "set_aside", "labels"), "TRUE")
     for number, label, instance, why, recorded in zip(*columns.values(), strict=True):
         try:

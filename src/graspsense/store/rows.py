@@ -95,7 +95,6 @@ class StoredTrial:
     record: TrialRecord
     recording: Path
     recording_sha256: str
-    recording_bytes: int
     recorder: Mapping[str, int]
     """The counters of `RecordingInfo`."""
 
@@ -213,7 +212,6 @@ def decoded(summary: TrialSummary, row: EncodedRow, recording: Path) -> StoredTr
         record=evolve(record, result=result, labels={k: v for k, v in labels.items() if v is not None}),
         recording=recording,
         recording_sha256=trial["recording_sha256"],
-        recording_bytes=trial["recording_bytes"],
         recorder=json_table(detail["recorder"]),
     )
 

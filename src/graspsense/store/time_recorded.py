@@ -46,12 +46,6 @@ def order_recorded(
     return _positions(known_times), ""
 
 
-def recorded_at(made_at: str, origin: str, labels: str) -> str | None:
-    """Return the time at which a trial was recorded, in ISO 8601; None if an import does not say it."""
-    stated = made_at if origin != "import" else _labels(labels).get(RECORDED_AT, "")
-    return stated if _time(stated) is not None else None
-
-
 def _positions(values: Sequence[float]) -> tuple[int, ...]:
     """Return the rank of each value; equal ones keep their order."""
     return tuple(np.argsort(np.argsort(values, kind="stable")).tolist())

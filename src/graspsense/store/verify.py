@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from attrs import frozen
+from attrs import asdict, frozen
 
 from graspsense.core.values.errors import DataDamaged, GraspsenseError
 from graspsense.recording.layout import PART
@@ -33,14 +33,7 @@ class Verified:
 
     def as_json(self) -> dict[str, Any]:
         """Return the fields as JSON values."""
-        return {
-            "intact": not self.problems and not self.unread,
-            "trials": self.trials,
-            "recordings": self.recordings,
-            "problems": list(self.problems),
-            **({"unread": list(self.unread)} if self.unread else {}),
-            "unfinished": list(self.unfinished),
-        }
+        return {"intact": not self.problems and not self.unread, **asdict(self)}
 
 
 def verify_store(folder: str | Path, progress: Progress | None = None) -> Verified:

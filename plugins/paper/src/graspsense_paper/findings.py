@@ -167,7 +167,7 @@ def _controls_table(summary: Summary, held: Sequence[RateComparison]) -> FoundTa
             continue
         line = (
             published.experiment,
-            published.what.partition(", ")[2] if published.class_ else published.what,
+            published.what.partition(", ")[2] if published.of_class else published.what,
             PROTOCOLS[row.protocol],
             sample(condition.rate),
             percent(condition.rate.mean),

@@ -27,7 +27,7 @@ class PublishedRate:
     target: str
     settings: Mapping[str, Any] = field(factory=dict)
     """The swept values that select the case of the experiment."""
-    class_: str = ""
+    of_class: str = ""
     correct: int | None = None
     n: int | None = None
     repeats: str = ""
@@ -104,8 +104,5 @@ def published() -> Published:
     values: dict[str, Any] = tomllib.loads(
         files("graspsense_paper").joinpath("published.toml").read_text(encoding="utf-8")
     )
-    for rate in values["rates"]:
-        if "class" in rate:
-            rate["class_"] = rate.pop("class")
     content: Published = structured(values, Published, "published.toml")
     return content

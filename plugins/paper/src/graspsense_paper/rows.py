@@ -143,7 +143,7 @@ def rows(summary: Summary, paper: Published) -> list[RateComparison]:
         for protocol, condition in conditions.items():
             if condition.case.data.states_per_instance != protocol:
                 continue
-            rates = of_class(condition, rate.class_) if rate.class_ else condition.rate
+            rates = of_class(condition, rate.of_class) if rate.of_class else condition.rate
             if rates is not None:
                 compared.append(
                     RateComparison(

@@ -8,7 +8,7 @@ label (*log-odds*). A decision tree, in which reasons can be looked up, has one 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, Final, Literal
 
 from attrs import frozen
@@ -158,12 +158,3 @@ class TreeNode:
     wrong: float
     parent: int | None = None
     branch: str = ""
-
-    def as_json(self) -> dict[str, Any]:
-        """Return it as JSON values."""
-        return {name: getattr(self, name) for name in TreeNode.__annotations__}
-
-    @classmethod
-    def from_json(cls, values: Mapping[str, Any]) -> TreeNode:
-        """Return the node that `as_json` gave."""
-        return cls(**values)

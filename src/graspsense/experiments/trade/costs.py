@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final, Literal
 
 from attrs import asdict, evolve, field, frozen
 
 from graspsense.core.components.strict import structured
 from graspsense.core.learn.labelled import Labelled, Target, class_of
-from graspsense.core.settings.resolved import Settings, settings_from
+from graspsense.core.settings.resolved import settings_from
 from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.trace import Trace
 from graspsense.experiments.recognise import EvaluationSettings, recognise
 from graspsense.experiments.task_results import ClassifierResult, RecognitionResult, TrialValues
-from graspsense.sources.simulated import Group
+from graspsense.sources.simulated import simulated
 from graspsense.sources.trial_source import TrialSource, groups_of
 
 FOLDS: Final = 10
@@ -90,14 +91,13 @@ def mean_seconds(settings: Mapping[str, Any], trials: TrialValues) -> float:
     return sum(durations) / len(durations)
 
 
-def settings_of(params: Mapping[str, Any]) -> Settings:
-    """Return the settings of a task."""
-    return settings_from(params["settings"], "the settings of the task")
-
-
-def trial_groups(params: Mapping[str, Any]) -> tuple[Group, ...]:
-    """Return the groups of simulated trials of a task."""
-    return groups_of(structured(params["data"], TrialSource, "[data]"))
+def simulated_trials(
+    params: Mapping[str, Any], seed: int, on_trace: Callable[[int, str, Trace], None] | None = None
+) -> Labelled:
+    """Return the simulated trials of a task."""
+    settings = settings_from(params["settings"], "the settings of the task")
+    groups = groups_of(structured(params["data"], TrialSource, "[data]"))
+    return simulated(settings, groups=groups, seed=seed, on_trace=on_trace)
 
 
 def target_labels(labels: Sequence[str], target: Target) -> list[str]:

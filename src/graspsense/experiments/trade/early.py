@@ -11,6 +11,7 @@ from attrs.validators import max_len
 
 from graspsense.core.components.strict import structured
 from graspsense.core.learn.checkpoints import contact_of
+from graspsense.core.settings.resolved import settings_from
 from graspsense.core.values.features import Features, table_of
 from graspsense.core.values.signals import Phase
 from graspsense.core.values.trace import Trace
@@ -21,12 +22,10 @@ from graspsense.experiments.task_results import ClassifierResult, RecognitionRes
 from graspsense.experiments.trade.costs import (
     FOLDS,
     CostSettings,
-    settings_of,
     simulated_result,
+    simulated_trials,
     target_labels,
-    trial_groups,
 )
-from graspsense.sources.simulated import simulated
 
 STRATIFIED: Final = f"stratified_{FOLDS}_fold"
 MOST_MOMENTS: Final = 100
@@ -51,8 +50,7 @@ def early(params: Mapping[str, Any], seed: int) -> RecognitionResult:
     """
     early_settings = structured(params["judge"], EarlySettings, "[judge]")
     moments = early_settings.moments_s
-    settings = settings_of(params)
-    feature_set = settings.features.create()
+    feature_set = settings_from(params["settings"], "the settings of the task").features.create()
     rows: dict[float, list[Features]] = {moment: [] for moment in moments}
     used_s: dict[float, list[float]] = {moment: [] for moment in moments}
 
@@ -66,7 +64,7 @@ def early(params: Mapping[str, Any], seed: int) -> RecognitionResult:
             rows[moment].append(feature_set.extract(trace.until(contact + moment)))
             used_s[moment].append(min(moment, end - contact))
 
-    data = simulated(settings, groups=trial_groups(params), seed=seed, on_trace=cut)
+    data = simulated_trials(params, seed, cut)
     results = []
     for name, learner in classifiers_of(params).items():
         suffix = f", {name}" if len(params["learners"]) > 1 else ""

@@ -9,17 +9,10 @@ from attrs import field, frozen
 from attrs.validators import ge
 
 from graspsense.core.components.strict import structured
-from graspsense.core.settings.resolved import settings_from
 from graspsense.core.values.errors import ConfigError
 from graspsense.experiments.recognise import TEST_SEED_OFFSET, classifiers_of, true_and_predicted
 from graspsense.experiments.task_results import ClassifierResult, RecognitionResult
-from graspsense.experiments.trade.costs import (
-    CostSettings,
-    settings_of,
-    simulated_result,
-    trial_groups,
-)
-from graspsense.sources.simulated import simulated
+from graspsense.experiments.trade.costs import CostSettings, simulated_result, simulated_trials
 
 PROTOCOL: Final = "learned_on_another_model"
 
@@ -47,9 +40,8 @@ class ModelErrorSettings(CostSettings):
 def physics(params: Mapping[str, Any], seed: int) -> RecognitionResult:
     """Return the rates on the correct model of classifiers trained on the wrong one. Raises ConfigError."""
     settings = structured(params["judge"], ModelErrorSettings, "[judge]")
-    groups = trial_groups(params)
-    training = simulated(_wrong_model(params, settings), groups=groups, seed=seed)
-    test = simulated(settings_of(params), groups=groups, seed=seed + TEST_SEED_OFFSET)
+    training = simulated_trials({**params, "settings": _wrong_model(params, settings)}, seed)
+    test = simulated_trials(params, seed + TEST_SEED_OFFSET)
     cost = float(settings.learned_on.get("accuracy", settings.error))
     results = []
     for name, learner in classifiers_of(params).items():
@@ -61,7 +53,8 @@ def physics(params: Mapping[str, Any], seed: int) -> RecognitionResult:
     return simulated_result(test, results)
 
 
-def _wrong_model(params: Mapping[str, Any], settings: ModelErrorSettings) -> Any:
+def _wrong_model(params: Mapping[str, Any], settings: ModelErrorSettings) -> dict[str, dict[str, Any]]:
+    """Return the settings of the model for training."""
     wrong = {table: dict(keys) for table, keys in params["settings"].items()}
     for key in settings.wrong:
         try:
@@ -71,4 +64,4 @@ def _wrong_model(params: Mapping[str, Any], settings: ModelErrorSettings) -> Any
                 f"judge.of: {key!r} is not a number among the settings of the gripper"
             ) from None
     wrong["gripper"].update(settings.learned_on)
-    return settings_from(wrong, "the wrong model")
+    return wrong

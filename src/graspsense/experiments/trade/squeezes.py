@@ -21,12 +21,10 @@ from graspsense.experiments.trade.costs import (
     FOLDS,
     CostSettings,
     mean_seconds,
-    settings_of,
     simulated_result,
+    simulated_trials,
     target_labels,
-    trial_groups,
 )
-from graspsense.sources.simulated import simulated
 
 MIN_PROBABILITY: Final = 1e-3
 """Lower bound on a probability: a label that a tree gives no trial may still be correct."""
@@ -51,7 +49,7 @@ def squeezes(params: Mapping[str, Any], seed: int) -> RecognitionResult:
     if the number of trials is not a multiple of the number of squeezes.
     """
     settings = structured(params["judge"], RepeatSettings, "[judge]")
-    data = simulated(settings_of(params), groups=trial_groups(params), seed=seed)
+    data = simulated_trials(params, seed)
     if len(data) % settings.most:
         raise ConfigError(
             f"{len(data)} trials are not a multiple of judge.most = {settings.most} squeezes: set data.trials to it"
