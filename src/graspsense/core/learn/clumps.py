@@ -28,14 +28,10 @@ NEAREST: Final = 1e-7
 """Distances, in standard deviations, below which the difference of two squares is not known."""
 _FEWEST: Final = 6
 """Trials of a label from which on it can be told whether they are in clumps."""
-_SHARE: Final = 3
-"""A clump has at most one of so many parts of the trials of its label: larger ones are kinds of the label."""
-_MOST_OTHERS: Final = 10
-"""Largest number of other trials in a clump behind which a gap is looked for: ten grasps of an object are usual."""
 _LARGEST: Final = 25
-"""Trials of a clump up to which it may be a recording; larger ones are kinds of their label."""
-_DRAWS: Final = 24
-_CLUMPED: Final = 7.0
+"""Trials of a clump up to which it may be of one object or recording; larger ones are kinds of their label."""
+_DRAWS: Final = 12
+_CLUMPED: Final = 6.0
 """Standard deviations by which gaps and merges, together, are larger than those of independent trials, if in clumps."""
 
 
@@ -81,11 +77,16 @@ def _signs(values: Values) -> tuple[float, float]:
     return float(_gaps(values).max(axis=1).sum()), _separation(values)
 
 
+def _largest(trials: int) -> int:
+    """Return how many trials of a label with so many a clump can have: with more than half, it is the label itself."""
+    return max(min(trials // 2, _LARGEST), 3)
+
+
 def _gaps(values: Values) -> Values:
     """Return m times the gap behind each neighbour m of each trial, shape (trials, neighbours)."""
     apart = distances_between(values, values)
     np.fill_diagonal(apart, np.inf)
-    others = max(min(len(values) // _SHARE, _MOST_OTHERS), 2)
+    others = _largest(len(values)) - 1
     near = np.sort(np.partition(apart, others, axis=1)[:, : others + 1], axis=1)
     gaps: Values = np.arange(1.0, others + 1.0) * np.diff(np.log(np.maximum(near, NEAREST)), axis=1)
     return gaps
@@ -99,7 +100,7 @@ def _separation(values: Values) -> float:
     parent = np.zeros(2 * n - 1, dtype=np.int64)
     parent[merges[:, :2].astype(np.int64)] = np.arange(n, 2 * n - 1)[:, np.newaxis]
     height = np.log(np.maximum(merges[:, 2], NEAREST))
-    small = np.flatnonzero(merges[:-1, 3] <= max(min(n // _SHARE, _LARGEST), 3))
+    small = np.flatnonzero(merges[:-1, 3] <= _largest(n))
     most = np.zeros(2 * n - 1)
     most[n + small] = height[parent[n + small] - n] - height[small]
     for cluster in range(2 * n - 3, -1, -1):
