@@ -162,7 +162,12 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
 
         if len(set(labels)) < 2:
             raise ValueError(f"all {len(labels)} trials have one label: there is nothing to tell apart")
-        self._refuse_endless(len(labels), len(table.names), len(set(labels)))
+        steps = self.training_steps(len(labels), len(table.names), len(set(labels)))
+        if steps > MOST_STEPS:
+            raise ValueError(
+                f"with these settings a training on {len(labels)} trials takes {steps:.1g} steps, of at most "
+                f"{MOST_STEPS:.1g} (about half a minute): choose smaller ones (see graspsense config classifier)"
+            )
         fitted = FittedEstimator(
             estimator=self.estimator(seed, len(labels)),
             table=table,
@@ -275,15 +280,6 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
         except ValueError as error:
             raise stored.refusal("skops", str(error)) from error
         return restored(stored, names, units, estimator)
-
-    def _refuse_endless(self, trials: int, features: int, labels: int) -> None:
-        """Raise ValueError if the settings make a training too long for this number of trials, features and labels."""
-        steps = self.training_steps(trials, features, labels)
-        if steps > MOST_STEPS:
-            raise ValueError(
-                f"with these settings a training on {trials} trials takes {steps:.1g} steps, of at most "
-                f"{MOST_STEPS:.1g} (about half a minute): choose smaller ones (see graspsense config classifier)"
-            )
 
     def _model(self) -> FittedEstimator:
         if self._fitted is None:
