@@ -23,6 +23,11 @@ from graspsense.core.values.nominal import with_codes as with_codes
 
 from graspsense.core.values.json_values import json_ready as json_ready
 
+# Features on one scale
+from graspsense.core.learn.scaling import Scaling as Scaling
+from graspsense.core.learn.scaling import mean_and_deviation as mean_and_deviation
+from graspsense.core.learn.scaling import scaling_of as scaling_of
+
 # Linear algebra
 from graspsense.core.learn.one_thread import one_thread as one_thread
 

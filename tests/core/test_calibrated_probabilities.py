@@ -5,12 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from test_conformal import bottles, model_of
+from test_conformal import bottles
 from test_evaluate import judged
 
-from graspsense.core.components.registry import installed
 from graspsense.core.learn.certainty import with_certainty
-from graspsense.core.learn.model_file import load_model, write_model
 
 
 @given(arrays(np.float64, (5, 4), elements=st.floats(0.0, 1.0)), st.floats(0.25, 1.0))
@@ -40,15 +38,3 @@ def test_evaluate_measures_the_calibrated_probabilities_and_those_before():
     assert (
         np.mean([evaluation.reliability.calibration_error for evaluation in judgements]) < 0.6 * uncalibrated
     )
-
-
-def test_a_model_in_a_file_gives_calibrated_probabilities(tmp_path):
-    trials = bottles(20, spread=1.2)
-    model = model_of(trials, "tree")
-    write_model(tmp_path / "m.json", model)
-    loaded = load_model(str(tmp_path / "m.json"), installed())
-    said, again = model.predict(trials.table.row(0)), loaded.predict(trials.table.row(0))
-
-    assert again.probabilities == said.probabilities
-    assert said.calibrated
-    assert said.certainty == said.probabilities[said.label] < 0.9  # its leaf says 100 %

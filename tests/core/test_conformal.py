@@ -268,6 +268,7 @@ def test_every_classifier_has_sets_that_loading_keeps_exactly(name, tmp_path):
         said, again = model.predict(trials.table.row(i)), loaded.predict(trials.table.row(i))
         assert (said.probabilities, said.prediction_set) == (again.probabilities, again.prediction_set)
         assert said.label in said.prediction_set
+        assert not said.calibrated or said.certainty == said.probabilities[said.label]
         assert said.coverage == 0.9
         assert said.set_in_words.endswith(" (right in 90 % of grasps for the same sessions)")
     model.classifier.to_json = lambda: {"means": np.zeros(2)}

@@ -99,6 +99,9 @@ class TestEvery:
         classifier = fitted(name, wide, labels)
         assert rate(classifier, wide, labels) > 0.95
         assert np.isfinite(classifier.probabilities(wide)).all()
+        # What training never saw change tells nothing, in newtons as in millinewtons.
+        other = evolve(wide, values=wide.values * (1.0, 1.0, 1.0, 1.0, 1000.0))
+        assert (classifier.probabilities(other) == classifier.probabilities(wide)).all()
 
     @pytest.mark.filterwarnings("error::RuntimeWarning")
     @every_case("factor", [1e-320, 1e-310, 1e90])
@@ -114,6 +117,7 @@ class TestEvery:
 @every_case("kept", [("bottle:full", "can:full"), ("bottle:empty", "bottle:full", "can:full")])
 def test_the_weights_of_a_network_are_the_network(kept):
     table, labels = trials()
+    table = evolve(table, values=table.values * (1.0, 1.0, 0.0))
     rows = np.flatnonzero(np.isin(labels, kept))
     network = fitted("mlp", table.rows(rows), [labels[i] for i in rows], kept_as="weights")
     again = stored("mlp", network, kept_as="weights")
@@ -153,7 +157,7 @@ def test_a_machine_with_the_range_as_scale_does_not_depend_on_units_and_fits_les
     same = fitted("svm", millimetres, labels, scaling="range", kernel="linear", c=1.0)
 
     assert metres.probabilities(table) == pytest.approx(same.probabilities(millimetres), abs=1e-6)
-    ready = metres._fitted.ready(table.values)
+    ready = metres._fitted.scaling.ready(table.values)
     assert (ready.min(axis=0), ready.max(axis=0)) == (pytest.approx(np.zeros(3)), pytest.approx(np.ones(3)))
 
 

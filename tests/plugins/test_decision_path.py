@@ -1,5 +1,6 @@
 """The path through a tree as reasons: one range a feature, which accepts exactly what all the tests accept."""
 
+import math
 import re
 
 import numpy as np
@@ -8,7 +9,7 @@ from cases import every_case
 from hypothesis import given
 from hypothesis import strategies as st
 
-from graspsense.core.learn.decision_path import FeatureRange, SplitTest, feature_ranges, path_reasons
+from graspsense.core.learn.decision_path import SplitTest, path_reasons
 from graspsense.core.values.features import Features, FeatureTable, Prediction
 from graspsense.core.values.units import in_words_apart
 from graspsense.plugin_api import create
@@ -22,12 +23,13 @@ def test_the_ranges_accept_exactly_what_all_the_tests_accept(tests, value, other
         SplitTest(feature=name, unit="m", value=value, threshold=threshold, above=value > threshold)
         for name, threshold in tests
     ]
-    ranges = {feature_range.feature: feature_range for feature_range in feature_ranges(path)}
+    reasons = {reason.features[0].name: reason for reason in path_reasons(path)}
 
-    for name in "abc":
+    for name, reason in reasons.items():
+        low, high = (-math.inf if reason.above is None else reason.above), reason.up_to
         accepted = all((other > test.threshold) == test.above for test in path if test.feature == name)
-        assert (name not in ranges or ranges[name].contains(other)) == accepted
-    assert len(path_reasons(path)) == len({name for name, _ in tests})
+        assert (low < other <= (math.inf if high is None else high)) == accepted
+    assert reasons.keys() == {name for name, _ in tests}
 
 
 @given(values=st.lists(NUMBERS, min_size=1, max_size=4))
@@ -48,7 +50,8 @@ def test_the_tightest_bound_is_told_with_the_unit_for_people():
     assert (above.features[0].value, above.above, above.up_to) == (0.0579, 0.057, None)
     (between,) = path_reasons([test(0.0569, True), test(0.0599, False)])
     assert between.words == "56.9 mm < p_first = 57.9 mm <= 59.9 mm"
-    assert FeatureRange(feature="f", unit="1", value=0.5, high=0.50001).words == "f = 0.5 <= 0.50001"
+    (below,) = path_reasons([SplitTest(feature="f", unit="1", value=0.5, threshold=0.50001, above=False)])
+    assert below.words == "f = 0.5 <= 0.50001"
 
 
 def test_a_share_of_training_trials_is_no_certainty():

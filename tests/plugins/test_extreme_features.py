@@ -104,3 +104,8 @@ def test_a_number_is_predicted_from_extreme_features(name, monkeypatch):
     for predicted in model.predict(table_of([[value] * 3 for value in EXTREMES])):
         assert math.isfinite(predicted.value)
         assert "unlike everything" in predicted.unlike
+    # A feature that was constant in training tells nothing of its unit.
+    same = evolve(given, value=target, table=evolve(given.table, values=given.table.values * (1.0, 1.0, 0.0)))
+    made = train_regression(name, same, name="m")
+    other = evolve(same.table, values=same.table.values + np.array([0.0, 0.0, 60.0]))
+    assert [each.value for each in made.predict(other)] == [each.value for each in made.predict(same.table)]

@@ -25,7 +25,6 @@ from numpy.typing import NDArray
 from graspsense.core.learn.answers import Answers
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.values.errors import FAILURES, ConfigError, counted, named
-from graspsense.core.values.features import FeatureTable
 from graspsense.evaluation.chosen import ChosenRate
 from graspsense.evaluation.crossval import ClassifierFactory, cross_validate, fit_and_predict
 from graspsense.evaluation.folds import INSTANCE_HELD_OUT, Folds
@@ -176,30 +175,17 @@ def _nested(answers: Mapping[tuple[str, str], _Answers], folds: Folds) -> tuple[
 
 def _answers(learner: ClassifierFactory, trials: Labelled, folds: Folds, seed: int) -> _Answers:
     """Return the answers of a candidate. Raises what its classifier raises."""
-    count = int(folds.max()) + 1
+    count, labels = int(folds.max()) + 1, np.array(trials.labels)
     inner = np.zeros((count, len(folds)), dtype=np.bool_)
     began = time.perf_counter()
     outer = cross_validate(learner, trials.table, trials.labels, folds, seed=seed)
     training_s = (time.perf_counter() - began) / count
     for fold, other in combinations(range(count), 2):
         away = (folds == fold) | (folds == other)
-        test = np.flatnonzero(away)
-        right = _right(learner, trials.table, trials.labels, np.flatnonzero(~away), test, seed)
+        test, training = np.flatnonzero(away), np.flatnonzero(~away)
+        known = labels[training].tolist()
+        classes, shares, _ = fit_and_predict(learner, trials.table, training, known, test, seed)
+        right = np.array(classes)[shares.argmax(axis=1)] == labels[test]
         inner[fold, test] |= right & (folds[test] == other)
         inner[other, test] |= right & (folds[test] == fold)
     return _Answers(inner=inner, outer=outer, training_s=training_s)
-
-
-def _right(
-    learner: ClassifierFactory,
-    table: FeatureTable,
-    labels: Sequence[str],
-    training: NDArray[np.int64],
-    test: NDArray[np.int64],
-    seed: int,
-) -> NDArray[np.bool_]:
-    """Return which test trials a classifier recognises that learned from the training trials."""
-    known = [labels[i] for i in training]
-    classes, shares, _ = fit_and_predict(learner, table, training, known, test, seed)
-    predicted = shares.argmax(axis=1).tolist()
-    return np.array([classes[k] == labels[i] for k, i in zip(predicted, test.tolist(), strict=True)])

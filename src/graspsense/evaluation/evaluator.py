@@ -115,11 +115,11 @@ class Evaluator:
 
     def by_class(self, pooled: Answers) -> dict[str, RecognitionRate]:
         """Return the rate among the trials of each class."""
-        right = pooled.right(self.labels)
-        rows: dict[str, list[int]] = {}
-        for i, label in enumerate(self.labels):
-            rows.setdefault(class_of(label), []).append(i)
-        return {name: self.rate_among(right, rows[name]) for name in natural_order(rows)}
+        right, classes = pooled.right(self.labels), np.array([class_of(label) for label in self.labels])
+        return {
+            name: self.rate_among(right, np.flatnonzero(classes == name).tolist())
+            for name in natural_order(classes.tolist())
+        }
 
     def unknown(self, pooled: Answers) -> RecognitionRate:
         """Return the share of trials that the model of their fold calls unknown, or that have no feature at all."""
@@ -133,15 +133,13 @@ class Evaluator:
 
     def by_features(self, pooled: Answers) -> dict[str, RecognitionRate]:
         """Return the rates among trials with features and without any; nothing if all trials have features."""
-        if not self._featureless.any():
-            return {}
-        right = pooled.right(self.labels)
         chosen = {"with features": ~self._featureless, "without any feature": self._featureless}
-        return {
-            name: self.rate_among(right, np.flatnonzero(chosen_trials).tolist())
-            for name, chosen_trials in chosen.items()
-            if chosen_trials.any()
-        }
+        right, rows = (
+            pooled.right(self.labels),
+            {name: np.flatnonzero(which) for name, which in chosen.items()},
+        )
+        among = {name: self.rate_among(right, which.tolist()) for name, which in rows.items() if len(which)}
+        return among if self._featureless.any() else {}
 
     def difference(
         self, minuend: Sequence[bool], subtrahend: Sequence[bool], rows: Sequence[int] | None = None

@@ -57,8 +57,7 @@ def stratified(labels: Sequence[str], k: int, seed: int) -> Folds:
     """
     check_folds(len(labels), k)
     rng = np.random.default_rng(seed)
-    folds = np.zeros(len(labels), dtype=np.int64)
-    assigned = 0
+    folds, assigned = np.zeros(len(labels), dtype=np.int64), 0
     for _, rows in _by_label(labels):
         shuffled = rng.permutation(rows)
         # Continuing where the previous label ended keeps the sizes of all folds equal to within one trial.
@@ -74,21 +73,11 @@ def instance_held_out(labels: Sequence[str], instances: Sequence[str], k: int, s
     there are as many folds as instances.
     """
     check_folds(len(labels), k)
-    rng = np.random.default_rng(seed)
-    objects = sorted(set(instances))
-    k = min(k, len(objects))
-    check_folds(len(labels), k)
-    instance_of = np.array(instances)
-    main = [
-        commonest([label for label, instance in zip(labels, instances, strict=True) if instance == name])
-        for name in objects
-    ]
-    fold_of = np.zeros(len(objects), dtype=np.int64)
-    assigned = 0
-    for _, members in _by_label(main):
-        fold_of[rng.permutation(members)] = (assigned + np.arange(len(members))) % k
-        assigned += len(members)
-    return fold_of[np.searchsorted(np.array(objects), instance_of)]
+    labels_of: dict[str, list[str]] = {name: [] for name in sorted(set(instances))}
+    for label, instance in zip(labels, instances, strict=True):
+        labels_of[instance].append(label)
+    fold_of = stratified([*map(commonest, labels_of.values())], min(k, len(labels_of)), seed)
+    return fold_of[np.searchsorted(np.array([*labels_of]), np.array(instances))]
 
 
 def held_out(labels: Sequence[str], instances: Sequence[str] | None, k: int, seed: int) -> Folds:

@@ -1,7 +1,6 @@
 """The estimators of numbers: those of scikit-learn, which is imported when one is made.
 
-A missing feature is the median of the training trials. Features and target are brought to mean 0 and standard deviation
-1 over the training trials.
+Features (`core.learn.scaling`) and target are brought to mean 0 and standard deviation 1 over the training trials.
 """
 
 from __future__ import annotations
@@ -14,13 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graspsense.core.learn.one_thread import one_thread
+from graspsense.core.learn.scaling import mean_and_deviation, scaling_of
 from graspsense.core.values.errors import ConfigError, counted, suggestion
-from graspsense.core.values.features import LARGEST_VALUE
 
 DEFAULT_ESTIMATOR: Final = "forest"
-MOST_SCALED: Final = 1e30
-"""The largest scaled feature: trees compute with 32 bits, distances with squares."""
-
 
 ESTIMATORS: Final[Mapping[str, tuple[str, Mapping[str, Any]]]] = {
     "forest": ("ensemble.RandomForestRegressor", {"n_estimators": 100}),
@@ -59,28 +55,22 @@ class FittedRegression:
         Raises ConfigError for an unknown name, ValueError for fewer than two trials.
         """
         from sklearn.compose import TransformedTargetRegressor
-        from sklearn.impute import SimpleImputer
-        from sklearn.pipeline import make_pipeline
         from sklearn.preprocessing import StandardScaler
 
         check_estimator(name)
         if len(values) < 2:
             raise ValueError(f"{counted(len(values), 'trial')}: an estimator needs at least two")
-        self._scaling = make_pipeline(
-            SimpleImputer(strategy="median", keep_empty_features=True), StandardScaler()
-        )
+        self._scaling = scaling_of(features, mean_and_deviation)
         self._estimator = TransformedTargetRegressor(
             regressor=_unfitted(name, seed, len(values)), transformer=StandardScaler()
         )
         with one_thread():
-            self._estimator.fit(self._scaling.fit_transform(features), values)
+            self._estimator.fit(self._scaling.ready(features), values)
 
     def predict(self, features: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the predicted values, shape (trials,). A feature that is too far away counts as the farthest."""
-        with np.errstate(over="ignore"):
-            scaled = self._scaling.transform(np.clip(features, -LARGEST_VALUE, LARGEST_VALUE))
-        scaled = np.clip(scaled, -MOST_SCALED, MOST_SCALED)
-        return np.asarray(self._estimator.predict(scaled), dtype=np.float64).reshape(len(features))
+        predicted = self._estimator.predict(self._scaling.ready(features))
+        return np.asarray(predicted, dtype=np.float64).reshape(len(features))
 
 
 def check_estimator(name: str) -> None:

@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 
 from graspsense.core.files.csv_text import csv_text
 from graspsense.core.files.whole_file import write_new
-from graspsense.core.learn.target_value import RESERVED, name_and_unit, number_of
+from graspsense.core.learn.target_value import RESERVED, name_and_unit
 from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.features import FeatureTable
 from graspsense.core.values.printable import in_one_line
+from graspsense.core.values.written_numbers import number_in
 from graspsense.recording.parquet import parquet
 from graspsense.store.changes import with_changed_numbers
 from graspsense.store.dataset import unpacked_table
@@ -119,12 +120,12 @@ def _numbers_to_predict(labels: Sequence[Mapping[str, str]]) -> FeatureTable:
         heading: name_and_unit(heading)
         for label in labels
         for heading, cell in label.items()
-        if name_and_unit(heading)[0] not in RESERVED and number_of(cell) is not None
+        if name_and_unit(heading)[0] not in RESERVED and number_in(cell) is not None
     }
     values = np.full((len(labels), len(headings)), np.nan)
     for row, label in enumerate(labels):
         for k, heading in enumerate(headings):
-            number = number_of(label.get(heading, ""))
+            number = number_in(label.get(heading, ""))
             values[row, k] = np.nan if number is None else number
     return FeatureTable(
         names=tuple(name for name, _ in headings.values()),

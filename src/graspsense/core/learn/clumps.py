@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -25,25 +25,16 @@ if TYPE_CHECKING:
     Values = NDArray[np.float64]
 
 NEAREST: Final = 1e-7
-"""Distances, in standard deviations, below which the difference of two squares is not known."""
+"""Distances, in standard deviations, that are none: trials so close are equal but for rounding."""
 _FEWEST: Final = 6
 """Trials of a label from which on it can be told whether they are in clumps."""
-_SHARE: Final = 3
-"""A clump has at most one of so many parts of the trials of its label: larger ones are kinds of the label."""
-_MOST_OTHERS: Final = 10
-"""Largest number of other trials in a clump behind which a gap is looked for: ten grasps of an object are usual."""
+_MOST_OTHERS: Final = 14
+"""Largest number of other trials in a clump behind which a gap is looked for: farther off, rings have gaps."""
 _LARGEST: Final = 25
 """Trials of a clump up to which it may be a recording; larger ones are kinds of their label."""
 _DRAWS: Final = 24
-_CLUMPED: Final = 7.0
+_CLUMPED: Final = 6.5
 """Standard deviations by which gaps and merges, together, are larger than those of independent trials, if in clumps."""
-
-
-def distances_between(values: Values, others: Values) -> Values:
-    """Return the distance of each trial to each of the others."""
-    squares = (values**2).sum(axis=1)[:, np.newaxis] + (others**2).sum(axis=1)
-    distances: Values = np.sqrt(np.maximum(squares - 2.0 * values @ others.T, 0.0))
-    return distances
 
 
 def parts_of_clumps(values: Values, labels: Sequence[str], first_of: Numbers) -> Numbers | None:
@@ -62,9 +53,7 @@ def parts_of_clumps(values: Values, labels: Sequence[str], first_of: Numbers) ->
         return None
     rng = np.random.default_rng(0)
     signs = np.array([_signs(values[rows]) for rows in judged]).sum(axis=0)
-    by_chance = np.array([[_signs(_drawn(values[rows], rng)) for rows in judged] for _ in range(_DRAWS)]).sum(
-        axis=1
-    )
+    by_chance = np.sum([[*map(_signs, _draws(values[rows], rng))] for rows in judged], axis=0)
     spread = np.maximum(by_chance.std(axis=0), NEAREST)
     if ((signs - by_chance.mean(axis=0)) / spread).sum() <= _CLUMPED:
         return None
@@ -83,9 +72,11 @@ def _signs(values: Values) -> tuple[float, float]:
 
 def _gaps(values: Values) -> Values:
     """Return m times the gap behind each neighbour m of each trial, shape (trials, neighbours)."""
-    apart = distances_between(values, values)
+    from scipy.spatial.distance import cdist
+
+    apart = cdist(values, values)
     np.fill_diagonal(apart, np.inf)
-    others = max(min(len(values) // _SHARE, _MOST_OTHERS), 2)
+    others = max(min(len(values) // 2 - 1, _MOST_OTHERS), 2)
     near = np.sort(np.partition(apart, others, axis=1)[:, : others + 1], axis=1)
     gaps: Values = np.arange(1.0, others + 1.0) * np.diff(np.log(np.maximum(near, NEAREST)), axis=1)
     return gaps
@@ -99,7 +90,7 @@ def _separation(values: Values) -> float:
     parent = np.zeros(2 * n - 1, dtype=np.int64)
     parent[merges[:, :2].astype(np.int64)] = np.arange(n, 2 * n - 1)[:, np.newaxis]
     height = np.log(np.maximum(merges[:, 2], NEAREST))
-    small = np.flatnonzero(merges[:-1, 3] <= max(min(n // _SHARE, _LARGEST), 3))
+    small = np.flatnonzero(merges[:-1, 3] <= max(min(n // 2, _LARGEST), 3))
     most = np.zeros(2 * n - 1)
     most[n + small] = height[parent[n + small] - n] - height[small]
     for cluster in range(2 * n - 3, -1, -1):
@@ -107,14 +98,14 @@ def _separation(values: Values) -> float:
     return float(most[:n].sum())
 
 
-def _drawn(values: Values, rng: np.random.Generator) -> Values:
-    """Return independent trials with the same values of each feature and about the same correlations of their ranks."""
+def _draws(values: Values, rng: np.random.Generator) -> Iterator[Values]:
+    """Yield independent trials with the same values of each feature and about the same correlations of their ranks."""
     from scipy.special import ndtri
     from scipy.stats import rankdata
 
     scores = ndtri((rankdata(values, axis=0) - 0.5) / len(values))
     _, sizes, axes = np.linalg.svd(scores, full_matrices=False)
-    normal = rng.normal(size=(len(values), len(sizes))) * sizes @ axes
-    places = np.argsort(np.argsort(normal, axis=0), axis=0)
-    drawn: Values = np.take_along_axis(np.sort(values, axis=0), places, axis=0)
-    return drawn
+    spread, ranked = sizes[:, np.newaxis] * axes, np.sort(values, axis=0)
+    for _ in range(_DRAWS):
+        normal = rng.normal(size=(len(values), len(sizes))) @ spread
+        yield np.take_along_axis(ranked, np.argsort(np.argsort(normal, axis=0), axis=0), axis=0)

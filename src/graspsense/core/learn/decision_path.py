@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from attrs import evolve, frozen
+from attrs import frozen
 
 from graspsense.core.values.reasons import FeatureValue, Reason, missing_feature
 from graspsense.core.values.units import in_words, in_words_apart
@@ -31,48 +31,6 @@ class SplitTest:
     share: float = 1.0
 
 
-@frozen(kw_only=True)
-class FeatureRange:
-    """The range of a feature on a path: `low < value <= high`. A missing bound is infinite."""
-
-    feature: str
-    unit: str
-    value: float
-    low: float = -math.inf
-    high: float = math.inf
-
-    def contains(self, value: float) -> bool:
-        """Return whether a trial with this value takes the same branches."""
-        return self.low < value <= self.high
-
-    @property
-    def words(self) -> str:
-        """The range as text, such as `57 mm < p_first = 57.9 mm <= 59.9 mm`."""
-        bounds = [bound for bound in (self.low, self.high) if math.isfinite(bound)]
-        value, *shown = in_words_apart([self.value, *bounds], self.unit)
-        text = f"{self.feature} = {value}"
-        if len(shown) == 2:
-            return f"{shown[0]} < {text} <= {shown[1]}"
-        return f"{text} {'>' if math.isfinite(self.low) else '<='} {shown[0]}"
-
-
-def feature_ranges(tests: Sequence[SplitTest]) -> tuple[FeatureRange, ...]:
-    """Return one range for each tested feature, in the order of the first tests; missing values have none."""
-    ranges: dict[str, FeatureRange] = {}
-    for test in tests:
-        if math.isnan(test.value):
-            continue
-        known = ranges.get(test.feature) or FeatureRange(
-            feature=test.feature, unit=test.unit, value=test.value
-        )
-        ranges[test.feature] = (
-            evolve(known, low=max(known.low, test.threshold))
-            if test.above
-            else evolve(known, high=min(known.high, test.threshold))
-        )
-    return tuple(ranges.values())
-
-
 def path_reasons(tests: Sequence[SplitTest]) -> tuple[Reason, ...]:
     """Return the reasons of a decision tree: the tightest bounds of each feature, and what was missing."""
     missing = [
@@ -85,7 +43,11 @@ def path_reasons(tests: Sequence[SplitTest]) -> tuple[Reason, ...]:
         for test in tests
         if math.isnan(test.value)
     ]
-    return (*(_of_range(feature_range) for feature_range in feature_ranges(tests)), *missing)
+    tested: dict[str, list[SplitTest]] = {}
+    for test in tests:
+        if not math.isnan(test.value):
+            tested.setdefault(test.feature, []).append(test)
+    return (*map(_range, tested.values()), *missing)
 
 
 def leaf_reason(with_label: float, trials: float, label: str) -> Reason:
@@ -93,10 +55,15 @@ def leaf_reason(with_label: float, trials: float, label: str) -> Reason:
     return Reason(words=f"{with_label:.4g} of the {trials:.4g} training trials in this leaf were {label}")
 
 
-def _of_range(feature_range: FeatureRange) -> Reason:
-    return Reason(
-        words=feature_range.words,
-        features=(FeatureValue(feature_range.feature, feature_range.value, feature_range.unit),),
-        above=feature_range.low if math.isfinite(feature_range.low) else None,
-        up_to=feature_range.high if math.isfinite(feature_range.high) else None,
-    )
+def _range(tests: Sequence[SplitTest]) -> Reason:
+    """Return the tightest bounds of a feature, as in `57 mm < p_first = 57.9 mm <= 59.9 mm`."""
+    feature, unit, given = tests[0].feature, tests[0].unit, tests[0].value
+    low = max((test.threshold for test in tests if test.above), default=None)
+    high = min((test.threshold for test in tests if not test.above), default=None)
+    value, *shown = in_words_apart([given, *(bound for bound in (low, high) if bound is not None)], unit)
+    words = f"{feature} = {value}"
+    if len(shown) == 2:
+        words = f"{shown[0]} < {words} <= {shown[1]}"
+    else:
+        words = f"{words} {'<=' if low is None else '>'} {shown[0]}"
+    return Reason(words=words, features=(FeatureValue(feature, given, unit),), above=low, up_to=high)

@@ -28,7 +28,7 @@ import numpy as np
 from attrs import evolve
 
 from graspsense.core.components.caller import option
-from graspsense.core.learn.clumps import NEAREST, distances_between, parts_of_clumps
+from graspsense.core.learn.clumps import NEAREST, parts_of_clumps
 from graspsense.core.learn.labelled import class_of
 from graspsense.core.values.errors import counted
 
@@ -183,11 +183,13 @@ def _near_copies(labelled: Labelled) -> tuple[Numbers, list[str]]:
 
     Trials of one named instance may be close.
     """
+    from scipy.spatial.distance import cdist
+
     pairs: list[Numbers] = [np.empty((2, 0), dtype=np.int64)]
     values = _scaled(labelled.table.values)
     if not 2 * _MOST_OTHERS < len(labelled) <= _MOST_TRIALS or values.shape[1] < 2:
         return pairs[0], []
-    apart = distances_between(values, values)
+    apart = cdist(values, values)
     np.fill_diagonal(apart, np.inf)
     if labelled.instances is not None:
         instances = np.unique(np.array(labelled.instances), return_inverse=True)[1]

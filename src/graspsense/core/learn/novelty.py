@@ -125,25 +125,21 @@ class Novelty:
             result[start : start + len(some)] = _worst(distance(some[:, np.newaxis, :]))
         return result
 
+    @np.errstate(invalid="ignore", over="ignore")
     def _outside(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the distance of each value from the range of each class, in standard deviations; NaN if unknown."""
-        with np.errstate(invalid="ignore", over="ignore"):
-            outside: NDArray[np.float64] = np.maximum(
-                np.maximum(self.lowest - values, values - self.highest), 0.0
-            )
-            return np.minimum(outside / self._scale(values), _FARTHEST)
+        outside = np.maximum(np.maximum(self.lowest - values, values - self.highest), 0.0)
+        return self._scaled(outside, values)
 
+    @np.errstate(invalid="ignore", over="ignore")
     def _from_middle(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the distance of each value from the middle of the range of each class, as `_outside` does."""
-        with np.errstate(invalid="ignore", over="ignore"):
-            away: NDArray[np.float64] = np.abs(values - 0.5 * (self.lowest + self.highest))
-            return np.minimum(away / self._scale(values), _FARTHEST)
+        return self._scaled(np.abs(values - 0.5 * (self.lowest + self.highest)), values)
 
-    def _scale(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the standard deviations; for a feature that was constant in training, what rounding may change."""
+    def _scaled(self, away: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return distances in standard deviations; of a feature that was constant, in what rounding may change."""
         rounding = _ROUNDING * np.maximum(np.abs(values), np.finfo(np.float64).tiny / _ROUNDING)
-        scale: NDArray[np.float64] = np.where(self.spread > 0.0, self.spread, rounding)
-        return scale
+        return np.minimum(away / np.where(self.spread > 0.0, self.spread, rounding), _FARTHEST)
 
     def to_json(self) -> dict[str, Any]:
         """Return the ranges as values that JSON represents exactly; an unknown one is None."""

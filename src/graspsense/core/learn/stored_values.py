@@ -172,14 +172,11 @@ class StoredValues:
             twice = next(name for name in given if given.count(name) > 1)
             raise self.refusal(key, f"{_shown(twice)} is there twice")
 
-    def _refuse_length(self, key: str, given: Sequence[Any], count: int | None) -> None:
-        if count is not None and len(given) != count:
-            raise self.refusal(key, f"does not fit: expected a list of {count}, found one of {len(given)}")
-
     def _refuse_shape(self, key: str, given: object, shape: Sequence[int | None], kinds: set[type]) -> None:
         if not isinstance(given, list | tuple):
             raise self.refusal(key, f"expected a list, found {_shown(given)}")
-        self._refuse_length(key, given, shape[0])
+        if shape[0] is not None and len(given) != shape[0]:
+            raise self.refusal(key, f"does not fit: expected a list of {shape[0]}, found one of {len(given)}")
         if len(shape) > 1:
             for i, item in enumerate(given):
                 self._refuse_shape(f"{key}.{i}", item, shape[1:], kinds)

@@ -43,7 +43,7 @@ def value_label(text: str) -> tuple[str, str]:
     Raises ConfigError if it is not of this form.
     """
     heading, equals, cell = (part.strip() for part in text.partition("="))
-    if not equals or not heading or number_of(cell) is None or name_and_unit(heading)[0] in RESERVED:
+    if not equals or not heading or number_in(cell) is None or name_and_unit(heading)[0] in RESERVED:
         raise ConfigError(
             f'{text!r} is not a number of a trial: write NAME [UNIT]=NUMBER, as in "fill [ml]=250"; the name is none '
             f"of {', '.join(RESERVED)}"
@@ -64,7 +64,7 @@ def values_of_labels(name: str, labels: Sequence[Mapping[str, str]], where: str)
         value = math.nan
         for heading, cell in label.items():
             called, unit = name_and_unit(heading)
-            number = number_of(cell)
+            number = number_in(cell)
             if number is not None and called not in RESERVED:
                 known.add(called)
             if called != name or called in RESERVED:
@@ -91,8 +91,3 @@ def values_of_labels(name: str, labels: Sequence[Mapping[str, str]], where: str)
             f'number with graspsense trials value DIR#7 --value "{name} [UNIT]=NUMBER"'
         )
     return next(iter(units)), values
-
-
-def number_of(cell: object) -> float | None:
-    """Return the finite number that a text is, or None."""
-    return number_in(str(cell))

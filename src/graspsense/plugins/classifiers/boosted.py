@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from graspsense.classifier_api import Reason
 from graspsense.plugin_api import ClassifierConfig, setting
-from graspsense.plugins.classifiers.scikit import ExplainedTrial, FittedEstimator, ScikitClassifier
+from graspsense.plugins.classifiers.scikit import ExplainedTrial, ScikitClassifier
 from graspsense.plugins.classifiers.tree_contributions import means_from_leaves, path_contributions
 
 
@@ -56,33 +56,25 @@ class Boosted(ScikitClassifier[BoostedConfig]):
 
     def reasons(self, trial: ExplainedTrial) -> Sequence[Reason]:
         """Return the contributions of the features to the odds of the label against the next most probable one."""
-        fitted, row = trial.fitted, trial.row
         label, against = list(trial.shares)[:2]
-        total, parts = 0.0, [0.0] * len(trial.given)
-        for sign, name in ((1.0, label), (-1.0, against)):
-            for k, value in enumerate(self._contributions(fitted, row, name)):
-                parts[k] += sign * value
-            total += sign * self._raw(fitted, row, name)
+        (output, parts), (other, others) = (self._output(trial, name) for name in (label, against))
+        each = parts - others
         return (
-            *trial.contributions(parts, total - sum(parts), "log-odds", against),
-            trial.most_likely(f"sum of {len(fitted.estimator.estimators_)} trees of each label"),
+            *trial.contributions(each.tolist(), output - other - float(each.sum()), "log-odds", against),
+            trial.most_likely(f"sum of {len(trial.fitted.estimator.estimators_)} trees of each label"),
         )
 
-    def _contributions(self, fitted: FittedEstimator, row: NDArray[np.float64], label: str) -> list[float]:
-        """Return the contribution of each feature to the output for a label."""
-        column = self.classes().index(label)
-        if len(self.classes()) == 2:  # one output, the log-odds of the second label
-            if column == 0:
-                return [0.0] * row.shape[1]
-            column = 0
-        trees = [stage[column].tree_ for stage in fitted.estimator.estimators_]
-        _, parts = path_contributions(trees, [means_from_leaves(tree) for tree in trees], row)
-        return [fitted.estimator.learning_rate * value for value in parts]
+    def _output(self, trial: ExplainedTrial, label: str) -> tuple[float, NDArray[np.float64]]:
+        """Return the output for a label before the softmax, and the contribution of each feature to it.
 
-    def _raw(self, fitted: FittedEstimator, row: NDArray[np.float64], label: str) -> float:
-        """Return the output for a label, before the softmax."""
-        outputs = fitted.estimator.decision_function(row)
-        column = self.classes().index(label)
+        Of two labels, the second has an output, the log-odds, and that of the first is 0.
+        """
+        estimator, column = trial.fitted.estimator, self.classes().index(label)
         if len(self.classes()) == 2:
-            return float(outputs[0]) if column == 1 else 0.0
-        return float(outputs[0, column])
+            if column == 0:
+                return 0.0, np.zeros(trial.row.shape[1])
+            column = 0
+        trees = [stage[column].tree_ for stage in estimator.estimators_]
+        _, parts = path_contributions(trees, [means_from_leaves(tree) for tree in trees], trial.row)
+        output = estimator.decision_function(trial.row).reshape(-1)[column]
+        return float(output), estimator.learning_rate * np.array(parts)

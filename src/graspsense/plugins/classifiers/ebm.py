@@ -152,19 +152,20 @@ class Ebm(Classifier[EbmConfig]):
 
     def probabilities(self, table: FeatureTable) -> NDArray[np.float64]:
         """Return the softmax of the log-odds, shape (trials, classes)."""
+        from scipy.special import softmax
+
         model = self._model()
-        total = model.log_odds(table.columns(model.names).values)
-        powers = np.exp(total - total.max(axis=1, keepdims=True))
-        return np.asarray(powers / powers.sum(axis=1, keepdims=True))
+        return np.asarray(softmax(model.log_odds(table.columns(model.names).values), axis=1))
 
     def explain(self, features: Features) -> Prediction:
         """Return the prediction with the contributions to the odds against the next most probable label."""
+        from scipy.special import softmax
+
         model = self._model()
         values = [features[name] for name in model.names]
         row = np.array([values])
         total = model.log_odds(row)[0]
-        powers = np.exp(total - total.max())
-        shares = dict(zip(model.labels, (powers / powers.sum()).tolist(), strict=True))
+        shares = dict(zip(model.labels, softmax(total).tolist(), strict=True))
         likeliest, runner_up = np.argsort(-total, kind="stable")[:2].tolist()
         given = feature_values(model.names, model.units, values)
         parts = []

@@ -22,7 +22,8 @@ def refuse_misfit(estimator: Any, expected: Any) -> None:
     """
     try:
         for name, value in expected.get_params(deep=False).items():
-            if name not in _OF_TRAINING and not _equal(getattr(estimator, name), value):
+            given = getattr(estimator, name)
+            if name not in _OF_TRAINING and (type(given) is not type(value) or given != value):
                 raise ValueError(f"{name} is not that of the settings")
         labels = estimator.classes_
         if labels.ndim != 1 or labels.dtype.kind != "U" or not 2 <= len(set(labels.tolist())) == len(labels):
@@ -30,10 +31,6 @@ def refuse_misfit(estimator: Any, expected: Any) -> None:
         _CHECKS[type(estimator).__name__](estimator, len(labels))
     except (AttributeError, IndexError, KeyError, TypeError, OverflowError) as error:
         raise ValueError(f"its parts do not fit each other ({type(error).__name__}: {error})") from error
-
-
-def _equal(given: Any, expected: Any) -> bool:
-    return type(given) is type(expected) and bool(given == expected)
 
 
 def _refuse_tree(estimator: Any, labels: int) -> None:

@@ -37,10 +37,10 @@ class Knn(ScikitClassifier[KnnConfig]):
 
     def reasons(self, trial: ExplainedTrial) -> Sequence[Reason]:
         """Return the contributions of the features to the share of votes, the votes, and the nearest distance."""
-        distances, rows = trial.fitted.estimator.kneighbors(trial.row)
-        votes = [trial.fitted.labels[i] for i in rows[0].tolist()]
+        distances, _ = trial.fitted.estimator.kneighbors(trial.row)
+        for_label, votes = self.counted(trial.fitted, trial.row)
         words = (
-            f"{votes.count(trial.label)} of the {len(votes)} nearest training trials are {trial.label}; the nearest is "
+            f"{for_label:.0f} of the {votes:.0f} nearest training trials are {trial.label}; the nearest is "
             f"{distances[0, 0]:.2g} standard deviations away"
         )
         return (*self.shapley_reasons(trial), Reason(words=words))

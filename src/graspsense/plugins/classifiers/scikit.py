@@ -1,14 +1,14 @@
 """The common part of the classifiers of scikit-learn, which is imported when one is fitted or loaded.
 
-Missing features are filled with the median of the training trials (0 where no training trial had the feature),
-then every feature is brought to mean 0 and standard deviation 1 over the training trials, unless the classifier says
-otherwise. A model is kept as its
-training trials, settings and seed, and made again from them when it is loaded, or as the fitted estimator itself
-through skops: nothing is unpickled, and with the same version of scikit-learn it is the same model.
+Features are filled and brought to mean 0 and standard deviation 1 over the training trials (`core.learn.scaling`),
+unless the classifier says otherwise. A model is kept as its training trials, settings and seed, and made again from
+them when it is loaded, or as the fitted estimator itself through skops: nothing is unpickled, and with the same version
+of scikit-learn it is the same model.
 """
 
 from __future__ import annotations
 
+import math
 import warnings
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
@@ -22,12 +22,15 @@ from graspsense.classifier_api import (
     LARGEST_SEED,
     FeatureValue,
     Reason,
+    Scaling,
     contribution_reasons,
     feature_values,
     in_words,
     json_ready,
+    mean_and_deviation,
     missing_feature,
     one_thread,
+    scaling_of,
 )
 from graspsense.plugin_api import (
     Classifier,
@@ -40,8 +43,6 @@ from graspsense.plugin_api import (
 )
 from graspsense.plugins.classifiers.shapley import shapley_values
 
-MOST_SCALED: Final = 1e30
-"""The largest scaled feature; one that is farther away counts as this."""
 MOST_STEPS: Final = 3e9
 """The most elementary steps of a training, each about 10 ns. A model that is kept as trials is trained when read."""
 
@@ -66,18 +67,7 @@ class FittedEstimator:
     table: FeatureTable
     labels: tuple[str, ...]
     seed: int
-    fill: NDArray[np.float64]
-    mean: NDArray[np.float64]
-    """The value of each feature that becomes 0, which is its mean unless the classifier scales it otherwise."""
-    scale: NDArray[np.float64]
-
-    def ready(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return these trials filled and scaled."""
-        filled: NDArray[np.float64] = np.where(np.isnan(values), self.fill, values)
-        with np.errstate(over="ignore"):
-            scaled = (filled - self.mean) / self.scale
-        # Trees compute with 32 bits, distances with squares.
-        return np.clip(scaled, -MOST_SCALED, MOST_SCALED)
+    scaling: Scaling
 
 
 @frozen(kw_only=True, eq=False)
@@ -143,7 +133,7 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
         start, parts = shapley_values(
             lambda rows: self.shares(trial.fitted, rows)[:, column],
             trial.row[0],
-            trial.fitted.ready(medians),
+            trial.fitted.scaling.ready(medians),
         )
         return trial.contributions(parts, start)
 
@@ -162,7 +152,7 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
         self, values: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the value of each feature that becomes 0, and the difference that becomes 1."""
-        return values.mean(axis=0), values.std(axis=0)
+        return mean_and_deviation(values)
 
     def fit(self, table: FeatureTable, labels: Sequence[str], seed: int) -> None:
         """Fill missing values, scale, and fit.
@@ -172,28 +162,22 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
 
         if len(set(labels)) < 2:
             raise ValueError(f"all {len(labels)} trials have one label: there is nothing to tell apart")
-        self._refuse_endless(len(labels), len(table.names), len(set(labels)))
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", RuntimeWarning)  # by numpy, for a column without values
-            fill = np.nan_to_num(np.nanmedian(table.values, axis=0), nan=0.0)
-        filled = np.where(np.isnan(table.values), fill, table.values)
-        # Powers of two, which keep every digit: the square of a value below 1e-162 would be 0.
-        units = np.ldexp(1.0, np.frexp(np.abs(filled).max(axis=0))[1] - 1)
-        origin, scale = self.origin_and_scale(filled / units)
-        # A feature that varies only by rounding is constant; scaling would amplify it to noise.
-        constant = scale <= 1e-12
+        steps = self.training_steps(len(labels), len(table.names), len(set(labels)))
+        if steps > MOST_STEPS:
+            raise ValueError(
+                f"with these settings a training on {len(labels)} trials takes {steps:.1g} steps, of at most "
+                f"{MOST_STEPS:.1g} (about half a minute): choose smaller ones (see graspsense config classifier)"
+            )
         fitted = FittedEstimator(
             estimator=self.estimator(seed, len(labels)),
             table=table,
             labels=tuple(labels),
             seed=seed,
-            fill=fill,
-            mean=origin * units,
-            scale=np.where(constant, 1.0, scale * units),
+            scaling=scaling_of(table.values, self.origin_and_scale),
         )
         # A training that diverges is told by what it gives, and not by warnings of numpy.
         with one_thread(), np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            fitted.estimator.fit(fitted.ready(table.values), np.array(labels))
+            fitted.estimator.fit(fitted.scaling.ready(table.values), np.array(labels))
         self._fitted = fitted
 
     def classes(self) -> tuple[str, ...]:
@@ -203,13 +187,13 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
     def probabilities(self, table: FeatureTable) -> NDArray[np.float64]:
         """Return the probabilities, shape (trials, classes)."""
         fitted = self._model()
-        return self.shares(fitted, fitted.ready(table.columns(fitted.table.names).values))
+        return self.shares(fitted, fitted.scaling.ready(table.columns(fitted.table.names).values))
 
     def explain(self, features: Features) -> Prediction:
         """Return the prediction with its reasons, and the values that replaced missing features."""
         fitted = self._model()
         values = [features[name] for name in fitted.table.names]
-        row = fitted.ready(np.array([values]))
+        row = fitted.scaling.ready(np.array([values]))
         probabilities = self.shares(fitted, row)[0].tolist()
         shares = dict(zip(self.classes(), probabilities, strict=True))
         ranked = dict(sorted(shares.items(), key=lambda item: -item[1]))
@@ -222,7 +206,7 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
                 f" ({features.reasons.get(feature.name, 'no reason given')}): the median in training, "
                 f"{in_words(float(fill), feature.unit)}, stands for it",
             )
-            for feature, fill in zip(given, fitted.fill, strict=True)
+            for feature, fill in zip(given, fitted.scaling.fill, strict=True)
             if feature.value is None
         ]
         return Prediction(
@@ -244,8 +228,14 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
             "features": list(zip(fitted.table.names, fitted.table.units, strict=True)),
         }
         if getattr(self.config, "kept_as", "trials") != "trials":
-            ready = {name: getattr(fitted, name).tolist() for name in ("fill", "mean", "scale")}
-            return {**kept, **ready, **self.estimator_as_json(fitted.estimator)}
+            scaling = fitted.scaling
+            return {
+                **kept,
+                "fill": scaling.fill.tolist(),
+                "mean": scaling.origin.tolist(),
+                "scale": [None if math.isinf(scale) else scale for scale in scaling.scale.tolist()],
+                **self.estimator_as_json(fitted.estimator),
+            }
         return {
             **kept,
             "labels": list(fitted.labels),
@@ -291,15 +281,6 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
             raise stored.refusal("skops", str(error)) from error
         return restored(stored, names, units, estimator)
 
-    def _refuse_endless(self, trials: int, features: int, labels: int) -> None:
-        """Raise ValueError if the settings make a training too long for this number of trials, features and labels."""
-        steps = self.training_steps(trials, features, labels)
-        if steps > MOST_STEPS:
-            raise ValueError(
-                f"with these settings a training on {trials} trials takes {steps:.1g} steps, of at most "
-                f"{MOST_STEPS:.1g} (about half a minute): choose smaller ones (see graspsense config classifier)"
-            )
-
     def _model(self) -> FittedEstimator:
         if self._fitted is None:
             raise ValueError("the classifier is neither fitted nor loaded yet")
@@ -320,15 +301,15 @@ def restored(
     stored: StoredValues, names: tuple[str, ...], units: tuple[str, ...], estimator: Any
 ) -> FittedEstimator:
     """Return an estimator that was stored with its preprocessing, without training trials. Raises DataDamaged."""
-    fill, mean, scale = (stored.numbers(name, (len(names),)) for name in ("fill", "mean", "scale"))
-    if not (scale > 0.0).all():
+    fill, mean = (stored.numbers(name, (len(names),)) for name in ("fill", "mean"))
+    scale = stored.numbers("scale", (len(names),), missing=True)
+    if (scale <= 0.0).any():
         raise stored.refusal("scale", "a feature has the scale 0, or a negative one")
     return FittedEstimator(
         estimator=estimator,
         table=FeatureTable(names=names, units=units, values=np.empty((0, len(names)))),
         labels=(),
         seed=stored.whole("seed", most=LARGEST_SEED),
-        fill=fill,
-        mean=mean,
-        scale=scale,
+        # A feature that was constant in training has none.
+        scaling=Scaling(fill=fill, origin=mean, scale=np.where(np.isnan(scale), np.inf, scale)),
     )

@@ -61,8 +61,9 @@ class Svm(ScikitClassifier[SvmConfig]):
 
     def shares(self, fitted: FittedEstimator, rows: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the softmax of the decision values."""
+        from scipy.special import softmax
+
         values = np.asarray(fitted.estimator.decision_function(rows), dtype=np.float64)
         if values.ndim == 1:  # two classes: one value, positive for the second
             values = np.column_stack((-values, values)) / 2.0
-        powers = np.exp(values - values.max(axis=1, keepdims=True))
-        return np.asarray(powers / powers.sum(axis=1, keepdims=True))
+        return np.asarray(softmax(values, axis=1))

@@ -45,7 +45,7 @@ class Cart(ScikitClassifier[CartConfig]):
 
     def reasons(self, trial: ExplainedTrial) -> Sequence[Reason]:
         """Return the path through the tree, with thresholds in the units of the features."""
-        fitted, row = trial.fitted, trial.row
+        fitted, row, scaling = trial.fitted, trial.row, trial.fitted.scaling
         inner = fitted.estimator.tree_
         nodes = fitted.estimator.decision_path(row).indices.tolist()
         tests = []
@@ -55,8 +55,8 @@ class Cart(ScikitClassifier[CartConfig]):
                 SplitTest(
                     feature=fitted.table.names[k],
                     unit=fitted.table.units[k],
-                    value=float(row[0, k] * fitted.scale[k] + fitted.mean[k]),
-                    threshold=float(inner.threshold[node] * fitted.scale[k] + fitted.mean[k]),
+                    value=float(row[0, k] * scaling.scale[k] + scaling.origin[k]),
+                    threshold=float(inner.threshold[node] * scaling.scale[k] + scaling.origin[k]),
                     above=bool(row[0, k] > inner.threshold[node]),
                 )
             )
@@ -65,7 +65,7 @@ class Cart(ScikitClassifier[CartConfig]):
     def support(self, table: FeatureTable) -> NDArray[np.float64]:
         """Return the training trials in the leaf of each trial."""
         fitted = self._model()
-        rows = fitted.ready(table.columns(fitted.table.names).values)
+        rows = fitted.scaling.ready(table.columns(fitted.table.names).values)
         inner = fitted.estimator.tree_
         return np.asarray(inner.n_node_samples[fitted.estimator.apply(rows)], dtype=np.float64)
 
