@@ -21,6 +21,8 @@ SLOTS: Final = ("elastic", "rigid", "maxwell", "loss", "foam", "snap")
 """The terms of the compiled law, of which a candidate switches some on. All candidates share its code."""
 ELASTIC, RIGID, MAXWELL, LOSS, FOAM, SNAP = range(len(SLOTS))
 MAX_STARTS: Final = 40
+NO_FALL: Final = 1e-4
+"""Length of the fall of a law with two slopes, over the compression."""
 
 
 class DataScale(NamedTuple):
@@ -112,7 +114,9 @@ class CandidateLaw:
         for slot in self.slots:
             cubic = [parameter.sign for parameter in self.free if parameter.name == "k3_n_m3"]
             form = "softening" if cubic == [-1.0] else "k1, k3" if cubic else "k1"
-            words.append(f"elastic ({form})" if slot == ELASTIC else SLOTS[slot])
+            kinks = (SNAP, "fall_m") in self.fixed
+            bent = f"{SLOTS[slot]} (two slopes)" if slot == SNAP and kinks else SLOTS[slot]
+            words.append(f"elastic ({form})" if slot == ELASTIC else bent)
         return " + ".join(words)
 
     def joined(self, other: CandidateLaw) -> CandidateLaw:
@@ -184,11 +188,19 @@ def static_candidates(scale: DataScale) -> list[CandidateLaw]:
         _free(SNAP, "fall_m", depth, (0.01, 2.0), 0.1, 0.3),
         _free(SNAP, "k2_n_m", k, (0.01, 100.0), 1.0),
     )
+    slopes = (
+        _free(SNAP, "k1_n_m", k, (0.01, 100.0), 0.6, 1.2, 2.0),
+        _free(SNAP, "critical_m", depth, (0.03, 1.0), 0.2, 0.35, 0.5, 0.65, 0.8),
+        _free(SNAP, "k2_n_m", k, (0.01, 100.0), 0.4, 2.0),
+    )
+    # A shell that falls by nothing, over a length that no recording shows.
+    no_fall = {(SNAP, "drop_n"): 0.0, (SNAP, "fall_m"): float(f"{NO_FALL * depth:.2g}")}
     return [
         CandidateLaw(free=(k1,)),
         CandidateLaw(free=(hertz,)),
         CandidateLaw(free=(k1, k3)),
         CandidateLaw(free=(stiffer, softening)),
+        CandidateLaw(free=slopes, fixed=no_fall),
         CandidateLaw(free=foam, fixed={(FOAM, "at_m"): float(f"{depth:.2g}")}),
         CandidateLaw(free=snap),
     ]
