@@ -28,10 +28,8 @@ Floats = NDArray[np.float64]
 SQUEEZE_FOLDS: Final = 5
 STRETCH_FOLDS: Final = 3
 """Parts of the squeezes, or of a single one, by which a candidate is judged."""
-WORTH_KEEPING: Final = 4.0
-"""A candidate whose residual is larger than the least by this factor is not tried with a lag."""
 WORTH_TRYING: Final = 3.0
-"""A candidate whose fit is worse than the best by this factor is not judged by held-out data."""
+"""A candidate whose fit is worse than the best by this factor is not judged by held-out data, nor tried with a lag."""
 MANY: Final = 4
 """Candidates that are usually judged, for the progress."""
 MANY_EVALUATIONS: Final = 400
@@ -99,7 +97,7 @@ def choose(
     scores = [_score(fitted, best, judged, fits) for fitted in [*fits, *dampers]]
     return Choice(
         fitted=best.fitted.refitted(max_evaluations=MANY_EVALUATIONS).part(given),
-        refined=tuple(fitted.part(given) for fitted in fits if fitted.rms <= WORTH_KEEPING * least),
+        refined=tuple(fitted.part(given) for fitted in fits if fitted.rms <= WORTH_TRYING * least),
         scores=tuple(sorted(scores, key=_rank)),
     )
 

@@ -106,14 +106,9 @@ class Fitted:
         return math.hypot(self.rms, LEAST_ERROR)
 
     @property
-    def parameters(self) -> int:
-        """The number of its free parameters, the lag included."""
-        return len(self.values) + int(self.has_lag)
-
-    @property
     def information(self) -> float:
         """Half of the Bayesian information criterion, less a constant: smaller is better."""
-        return information(self.rms, self.parameters, len(self.residuals))
+        return information(self.rms, len(self.values) + int(self.has_lag), len(self.residuals))
 
     @property
     def by_label(self) -> dict[str, float]:

@@ -30,25 +30,22 @@ class DataScale(NamedTuple):
 
     force_n: float
     depth_m: float
-    load_s: float
+    speed_m_s: float
+    """The speed of the compression."""
     memory_s: float
     """The longest time over which a memory of the object shows: the compression and the hold."""
     sample_s: float
     """Time between samples of the force."""
 
-    @property
-    def speed_m_s(self) -> float:
-        """The speed of the compression."""
-        return self.depth_m / max(self.load_s, 1e-3)
-
 
 def scale_of(squeezes: Sequence[Squeeze]) -> DataScale:
     """Return the size of these squeezes."""
     times = [squeeze.stretches for squeeze in squeezes]
+    depth_m = float(np.median([squeeze.depth_m for squeeze in squeezes]))
     return DataScale(
         force_n=float(np.median([squeeze.peak_n for squeeze in squeezes])),
-        depth_m=float(np.median([squeeze.depth_m for squeeze in squeezes])),
-        load_s=float(np.median([timing.load_s for timing in times])),
+        depth_m=depth_m,
+        speed_m_s=depth_m / max(float(np.median([timing.load_s for timing in times])), 1e-3),
         memory_s=max(timing.load_s + timing.hold_s for timing in times),
         sample_s=float(np.median([np.median(np.diff(squeeze.t_s[squeeze.sample])) for squeeze in squeezes])),
     )

@@ -115,6 +115,7 @@ def _grasp(
     understood: Understood, episode: Episode, columns: GraspColumns, number: int
 ) -> tuple[LabelledRecording]:
     start_s = float(columns.t_s[0])
+    frame = int(np.searchsorted(times_of(understood, episode), start_s))
     where = [
         f"video {key}: {path}, from {first_s + start_s:.3f} s"
         + ("" if (understood.folder.place / path).is_file() else ", which is missing")
@@ -131,7 +132,7 @@ def _grasp(
         LabelledRecording(
             recording=recording,
             source=columns.source,
-            label=label_of_task(episode.task),
+            label=label_of_task(episode.tasks[frame]),
             order=episode.index + number / 1000.0,
             notices=(*columns.warnings, *of_gap),
         ),

@@ -424,18 +424,18 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
 
     def _check_gap(self) -> None:
         """Raise DeviceLost where the gap is not the width of what the fingers press on."""
-        held = self._forces.held() if isinstance(self._forces, ForceGauge) else None
-        if held is None:
+        assert isinstance(self._forces, ForceGauge)
+        places_m = self._forces.places_m()
+        if not len(places_m):
             return
-        axis, aside_m = self._travel.axis, 0.0
-        for place, face in zip(held.places, faces(self._model, self._opened(), self._gripper), strict=True):
-            away = place - face
-            aside_m += float(np.linalg.norm(away - (away @ axis) * axis))
+        axis, held_m = self._travel.axis, float(places_m[1, 0] - places_m[0, 0])
+        away = places_m[:, 1:] - faces(self._model, self._opened(), self._gripper)
+        aside_m = float(np.linalg.norm(away - np.outer(away @ axis, axis), axis=1).sum())
         most_m = min(OTHER_WIDTH * self._travel.open_m, OTHER_WIDTH_M + TILT * aside_m)
-        if abs(self._gap_m - held.width_m) > most_m:
+        if abs(self._gap_m - held_m) > most_m:
             raise DeviceLost(
-                f"the gap is {self._gap_m * 1e3:.3g} mm where the fingers press on what is {held.width_m * 1e3:.3g} mm "
-                "wide (0: on each other). Look at gap in gripper.file, and at margins of geoms in the model"
+                f"the gap is {self._gap_m * 1e3:.3g} mm where the fingers press on what is {held_m * 1e3:.3g} mm wide "
+                "(0: on each other). Look at gap in gripper.file, and at margins of geoms in the model"
             )
 
     def _break_shell(self, data: mujoco.MjData) -> None:

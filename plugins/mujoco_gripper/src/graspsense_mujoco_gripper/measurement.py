@@ -57,14 +57,6 @@ def gap_reader(model: mujoco.MjModel, data: mujoco.MjData, gap: Gap, axis: Float
     return gap_m
 
 
-@frozen(eq=False)
-class Held:
-    """What both fingers press on: its width (m), and where the left and the right finger press."""
-
-    width_m: float
-    places: tuple[Floats, Floats]
-
-
 class ForceGauge:
     """Measures the forces (N) that close both fingers on a thing; positive where they press.
 
@@ -147,19 +139,17 @@ class ForceGauge:
             along = rows[3 * k] * force[0] + rows[3 * k + 1] * force[1] + rows[3 * k + 2] * force[2]
             yield k, signs[0] * along, signs[1] * along
 
-    def held(self) -> Held | None:
-        """Return what both fingers press on, which is of no width where they press on each other.
+    def places_m(self) -> Floats:
+        """Return where each finger presses: the thing's surface along the closing direction, x, y and z, a row each.
 
-        None where one of them presses on nothing. With a margin, a thing is pressed before it is reached.
+        There are no rows where one presses on nothing. With a margin, a thing is pressed before it is reached.
         """
         contact, axis, moments = self._data.contact, self._axis, np.zeros((2, 5))
         for k, on_left, on_right in self._contacts():
-            place_m = contact.pos[k] @ axis + copysign(max(contact.dist[k], 0.0) / 2.0, on_left - on_right)
-            moments += np.outer((on_left, on_right), (1.0, place_m, *contact.pos[k]))
-        if min(moments[:, 0]) <= 0.0:
-            return None
-        left, right = moments[:, 1:] / moments[:, :1]
-        return Held(float(right[0] - left[0]), (left[1:], right[1:]))
+            surface_m = contact.pos[k] @ axis + copysign(max(contact.dist[k], 0.0) / 2.0, on_left - on_right)
+            moments += np.outer((on_left, on_right), (1.0, surface_m, *contact.pos[k]))
+        places: Floats = moments[:, 1:] / moments[:, :1] if min(moments[:, 0]) > 0.0 else moments[:0]
+        return places
 
     def squeeze_n(self) -> float:
         """Return the force that squeezes a thing along the closing direction, by whatever parts of the gripper move."""
