@@ -98,7 +98,11 @@ def choose(
     return Choice(
         fitted=best.fitted.refitted(max_evaluations=MANY_EVALUATIONS).part(given),
         refined=tuple(fitted.part(given) for fitted in fits if fitted.rms <= WORTH_TRYING * least),
-        scores=tuple(sorted(scores, key=_rank)),
+        scores=tuple(
+            sorted(
+                scores, key=lambda own: (not own.chosen, np.nan_to_num(own.error, nan=np.inf), own.fit_error)
+            )
+        ),
     )
 
 
@@ -121,11 +125,6 @@ def _adds_nothing(fitted: Fitted, fits: Sequence[Fitted]) -> bool:
         or (simpler.by_label.keys() < own and fitted.error > (1.0 - LEAST_GAIN) * simpler.error)
         for simpler in fits
     )
-
-
-def _rank(score: CandidateScore) -> tuple[bool, float, float]:
-    """Return the key of the order of the table: the chosen candidate, then by the error on held-out data."""
-    return not score.chosen, math.inf if math.isnan(score.error) else score.error, score.fit_error
 
 
 def _judged(fitted: Fitted) -> _Judged:

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from graspsense_identify.fit import Fitted
 from graspsense_identify.forward import ForwardModel
-from graspsense_identify.laws import SNAP, CandidateLaw, FitStart
+from graspsense_identify.laws import SNAP, CandidateLaw
 from graspsense_identify.prepare import CONTACT_SHARE, Squeeze
 
 Floats = NDArray[np.float64]
@@ -68,12 +68,9 @@ def with_corners(model: ForwardModel, law: CandidateLaw, squeezes: Sequence[Sque
     peak_n = float(np.median([squeeze.peak_n for squeeze in squeezes]))
     starts = []
     for critical, fall, (offset, k1, drop, k2) in _minima(loads, depth):
-        # A force at the contact is that of a wider object, whose compression is larger by as much.
-        wider = offset / k1
+        # A force at the contact is that of a wider object, whose compression is larger by as much, or of noise.
         units = np.array([peak_n / depth, depth, peak_n, depth, peak_n / depth])
-        values = tuple((units * (k1, critical + wider, drop, fall, k2)).tolist())
-        # The error of the width by the force at the contact is itself in error by noise.
-        starts += [FitStart(values, wider * depth), FitStart(values, 0.0)]
+        starts.append(tuple((units * (k1, critical + offset / k1, drop, fall, k2)).tolist()))
     return evolve(law, more_starts=tuple(starts))
 
 

@@ -160,9 +160,7 @@ def fit(model: ForwardModel, candidate: CandidateLaw, squeezes: Sequence[Squeeze
     if len(vectors) > STARTS:
         costs = [np.sum(problem.residuals(vector) ** 2) for vector in vectors]
         vectors = [vectors[int(k)] for k in np.argsort(costs)[:STARTS]]
-    for start in candidate.more_starts:
-        wider = start.wider_m / problem.depths
-        vectors.append(np.concatenate([np.log(start.values), wider, zeros[problem.n :]]))
+    vectors += [np.concatenate([np.log(values), zeros]) for values in candidate.more_starts]
     return problem.solved(vectors)
 
 

@@ -81,22 +81,13 @@ class FreeParameter:
         return self.name in TERMS[self.slot].stiffnesses
 
 
-class FitStart(NamedTuple):
-    """Where a fit starts."""
-
-    values: tuple[float, ...]
-    """Of the free parameters."""
-    wider_m: float
-    """By how much the objects are wider than the first estimate."""
-
-
 @frozen(kw_only=True)
 class CandidateLaw:
     """Terms with free and fixed parameters."""
 
     free: tuple[FreeParameter, ...]
     fixed: Mapping[tuple[int, str], float] = field(factory=dict)
-    more_starts: tuple[FitStart, ...] = ()
+    more_starts: tuple[tuple[float, ...], ...] = ()
     """Where a fit starts besides the combinations of the starts of each parameter."""
 
     @cached_property

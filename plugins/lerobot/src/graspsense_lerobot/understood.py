@@ -61,8 +61,8 @@ def understand(folder: Folder, options: PlaceOptions) -> Understood:
     counts = Counter(names)
     if twice := [name for name in counts if counts[name] > 1 and name not in meaning.others]:
         raise DataDamaged(
-            f"{folder.place}: meta/info.json gives {some(twice)} to several numbers of a feature, so that it names none "
-            "of them: give each a name of its own, as in left_gripper.pos"
+            f"{folder.place}: meta/info.json gives {some(twice)} to several numbers of a feature: give each a name of "
+            "its own, as in left_gripper.pos"
         )
     gap = next(iter(meaning.gap), "")
     if not gap:
