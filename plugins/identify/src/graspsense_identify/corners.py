@@ -128,25 +128,19 @@ def corner_errors(fitted: Fitted) -> Floats:
     if "snap.fall_m" not in labels:
         return np.zeros(len(labels))
     squeezes, values = fitted.squeezes, fitted.by_label
-    ways = [np.abs(np.diff(squeeze.gap_m[squeeze.sample])) for squeeze in squeezes]
-    moving = np.concatenate([way[way > MOVING_SHARE * np.max(way)] for way in ways])
-    share = math.sqrt(1.0 / 6.0)
-    if _on_falling_part(fitted, values["snap.critical_m"], values["snap.fall_m"]) >= LEAST_FALLING:
-        share = 0.0
-    error_m = share * float(np.median(moving)) / math.sqrt(len(squeezes))
+    critical_m, fall_m = values["snap.critical_m"], values["snap.fall_m"]
+    ways, falling = [], 0
+    for squeeze, width in zip(squeezes, fitted.widths_m, strict=True):
+        gap = squeeze.gap_m[squeeze.sample]
+        compression = (width - gap - fitted.model.compressed_m(squeeze.force_n))[squeeze.loading]
+        falling += int(np.sum((compression > critical_m) & (compression < critical_m + fall_m)))
+        way = np.abs(np.diff(gap))
+        ways.append(way[way > MOVING_SHARE * np.max(way)])
+    share = 0.0 if falling >= LEAST_FALLING else math.sqrt(1.0 / 6.0)
+    error_m = share * float(np.median(np.concatenate(ways))) / math.sqrt(len(squeezes))
     errors = {
         "snap.critical_m": error_m,
         "snap.fall_m": math.sqrt(2.0) * error_m,
         "snap.drop_n": error_m * (values["snap.k1_n_m"] + values["snap.k2_n_m"]),
     }
     return np.array([errors.get(label, 0.0) / values[label] for label in labels])
-
-
-def _on_falling_part(fitted: Fitted, critical_m: float, fall_m: float) -> int:
-    """Return how many samples lie on the falling part of a snap-through while the fingers close."""
-    count = 0
-    for squeeze, width in zip(fitted.squeezes, fitted.widths_m, strict=True):
-        closure = width - squeeze.gap_m[squeeze.sample]
-        compression = (closure - fitted.model.compressed_m(squeeze.force_n))[: int(np.argmax(closure)) + 1]
-        count += int(np.sum((compression > critical_m) & (compression < critical_m + fall_m)))
-    return count
