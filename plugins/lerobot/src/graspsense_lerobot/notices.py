@@ -83,8 +83,8 @@ def moments_of(columns: GraspColumns) -> str:
     if not len(force) or float(np.ptp(force)) == 0.0:
         return "no contact is found in the force"
     contact = int((force > force.min() + TOUCHED * np.ptp(force)).argmax())
-    before = gap[: contact + 1]
-    closing = int(np.flatnonzero(before >= before.max() - 0.02 * np.ptp(gap))[-1])
+    free = gap[: contact + 1]
+    closing = int(np.flatnonzero(free >= free.max() - 0.02 * np.ptp(gap))[-1])
     return (
         f"closing from {columns.t_s[closing]:.3f} s of the episode, contact at {columns.t_s[contact]:.3f} s"
     )

@@ -132,12 +132,7 @@ def _moved(model: mujoco.MjModel, gripper: GripperFile, width_m: float | None) -
     left, right = faces(model, data, gripper)
     axis = closing_axis(gripper, left, right)
     travel_m = _opposed_travel_m(model, gripper, axis, (states[0], states[-1]))
-    share = (gaps[0] - gaps[-1]) / travel_m
-    if gripper.gap.joint and not 1.0 / OTHER_TRAVEL < share < OTHER_TRAVEL:
-        raise ConfigError(
-            f"gripper.file: by the joint {gripper.gap.joint!r} the gap closes by {(gaps[0] - gaps[-1]) * 1e3:.3g} mm, "
-            f"and the fingers by {travel_m * 1e3:.3g} mm: look at scale, in metres of the gap for a unit of the joint"
-        )
+    _check_scale(gripper.gap.joint, gaps[0] - gaps[-1], travel_m)
     if gripper.gap.sites or gripper.gap.left:
         # The gap depends on the closing direction.
         measured_m = gap_reader(model, data, gripper.gap, axis)
@@ -155,6 +150,15 @@ def _moved(model: mujoco.MjModel, gripper: GripperFile, width_m: float | None) -
     slopes = np.gradient(table, grid, axis=1)[:, POINTS // 2]
     mass_kg = _mass(model, gripper, half, axis, slopes)
     return Travel(grid, table, mass_kg, axis, (left + right) / 2.0, qpos_open)
+
+
+def _check_scale(joint: str, closed_m: float, travel_m: float) -> None:
+    """Raise ConfigError where the gap by a joint does not close as the fingers do."""
+    if joint and not 1.0 / OTHER_TRAVEL < closed_m / travel_m < OTHER_TRAVEL:
+        raise ConfigError(
+            f"gripper.file: by the joint {joint!r} the gap closes by {closed_m * 1e3:.3g} mm, and the fingers by "
+            f"{travel_m * 1e3:.3g} mm: look at scale, in metres of the gap for a unit of the joint"
+        )
 
 
 def _check_angles(model: mujoco.MjModel, gripper: GripperFile) -> None:
