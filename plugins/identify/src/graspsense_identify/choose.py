@@ -28,10 +28,8 @@ Floats = NDArray[np.float64]
 SQUEEZE_FOLDS: Final = 5
 STRETCH_FOLDS: Final = 3
 """Parts of the squeezes, or of a single one, by which a candidate is judged."""
-WORTH_KEEPING: Final = 4.0
-"""A candidate whose residual is larger than the least by this factor is not tried with a lag."""
 WORTH_TRYING: Final = 3.0
-"""A candidate whose fit is worse than the best by this factor is not judged by held-out data."""
+"""A candidate whose fit is worse than the best by this factor is not judged by held-out data, nor tried with a lag."""
 MANY: Final = 4
 """Candidates that are usually judged, for the progress."""
 MANY_EVALUATIONS: Final = 400
@@ -99,8 +97,12 @@ def choose(
     scores = [_score(fitted, best, judged, fits) for fitted in [*fits, *dampers]]
     return Choice(
         fitted=best.fitted.refitted(max_evaluations=MANY_EVALUATIONS).part(given),
-        refined=tuple(fitted.part(given) for fitted in fits if fitted.rms <= WORTH_KEEPING * least),
-        scores=tuple(sorted(scores, key=_rank)),
+        refined=tuple(fitted.part(given) for fitted in fits if fitted.rms <= WORTH_TRYING * least),
+        scores=tuple(
+            sorted(
+                scores, key=lambda own: (not own.chosen, np.nan_to_num(own.error, nan=np.inf), own.fit_error)
+            )
+        ),
     )
 
 
@@ -123,11 +125,6 @@ def _adds_nothing(fitted: Fitted, fits: Sequence[Fitted]) -> bool:
         or (simpler.by_label.keys() < own and fitted.error > (1.0 - LEAST_GAIN) * simpler.error)
         for simpler in fits
     )
-
-
-def _rank(score: CandidateScore) -> tuple[bool, float, float]:
-    """Return the key of the order of the table: the chosen candidate, then by the error on held-out data."""
-    return not score.chosen, math.inf if math.isnan(score.error) else score.error, score.fit_error
 
 
 def _judged(fitted: Fitted) -> _Judged:

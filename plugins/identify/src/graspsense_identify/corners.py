@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from graspsense_identify.fit import Fitted
 from graspsense_identify.forward import ForwardModel
-from graspsense_identify.laws import SNAP, CandidateLaw, FitStart
+from graspsense_identify.laws import SNAP, CandidateLaw
 from graspsense_identify.prepare import CONTACT_SHARE, Squeeze
 
 Floats = NDArray[np.float64]
@@ -49,38 +49,29 @@ LEAST_FALLING: Final = 2
 
 
 class _Load(NamedTuple):
-    """The compression of an object over the largest one, and the force over its peak, at the samples."""
+    """The compression of an object and the force over its peak, at the samples until the largest compression."""
 
     compression: Floats
     force: Floats
 
 
-class _Corners(NamedTuple):
-    """Pairs of corners over the largest compression, and what follows from them: an entry or a row for each pair."""
-
-    critical: Floats
-    fall: Floats
-    cost: Floats
-    """The sum of the squared residuals; infinite if the numbers are not those of a snap-through."""
-    numbers: Floats
-    """The force at the contact, k1, the drop, and k2, shape (n, 4)."""
-
-
 def with_corners(model: ForwardModel, law: CandidateLaw, squeezes: Sequence[Squeeze]) -> CandidateLaw:
     """Return the law with further starts at the corners that the squeezes show, if it is a snap-through alone."""
-    if law.slots != (SNAP,):
+    if law.slots != (SNAP,) or law.fixed:
         return law
-    loads_m = [_loading(model, squeeze) for squeeze in squeezes]
+    loads = [_loading(model, squeeze) for squeeze in squeezes]
     # Through the fingertips, a hard object has no compression but that of the noise.
-    loads_m = [load for load in loads_m if len(load.force) >= LEAST_SAMPLES and load.compression[-1] > 0.0]
-    if not loads_m:
+    loads = [load for load in loads if len(load.force) >= LEAST_SAMPLES and load.compression[-1] > 0.0]
+    if not loads:
         return law
-    depth = float(np.median([load.compression[-1] for load in loads_m]))
-    loads = [load._replace(compression=load.compression / depth) for load in loads_m]
+    depth = float(np.median([load.compression[-1] for load in loads]))
     peak_n = float(np.median([squeeze.peak_n for squeeze in squeezes]))
-    starts = [_start(*corners, depth, peak_n) for corners in zip(*_minima(loads), strict=True)]
-    # The error of the width by the force at the contact is itself in error by noise.
-    return evolve(law, more_starts=(*starts, *(start._replace(wider_m=0.0) for start in starts)))
+    starts = []
+    for critical, fall, (offset, k1, drop, k2) in _minima(loads, depth):
+        # A force at the contact is that of a wider object, whose compression is larger by as much, or of noise.
+        units = np.array([peak_n / depth, depth, peak_n, depth, peak_n / depth])
+        starts.append(tuple((units * (k1, critical + offset / k1, drop, fall, k2)).tolist()))
+    return evolve(law, more_starts=tuple(starts))
 
 
 def _loading(model: ForwardModel, squeeze: Squeeze) -> _Load:
@@ -92,55 +83,38 @@ def _loading(model: ForwardModel, squeeze: Squeeze) -> _Load:
     return _Load(compression[part], force[part])
 
 
-def _minima(loads: Sequence[_Load]) -> _Corners:
-    """Return the pairs of corners of the best minima on the grid, the best one first."""
+def _minima(loads: Sequence[_Load], depth: float) -> list[tuple[float, float, Floats]]:
+    """Return the corners over the depth at the best minima on the grid, the best first, and what follows from each.
+
+    These are the force at the contact, k1, the drop, and k2, over the peak and the depth.
+    """
     critical, fall = (axis.ravel() for axis in np.meshgrid(CRITICAL, FALL, indexing="ij"))
-    tried = _at_corners(loads, critical, fall)
-    cost = tried.cost.reshape(len(CRITICAL), len(FALL))
-    bordered = np.pad(cost, 1, constant_values=np.inf)
-    neighbours = np.lib.stride_tricks.sliding_window_view(bordered, (3, 3)).min(axis=(2, 3))
-    minima = np.flatnonzero((cost <= neighbours) & np.isfinite(cost))
-    best = minima[np.argsort(tried.cost[minima], kind="stable")][:BEST]
-    return _Corners(*(column[best] for column in tried))
-
-
-def _at_corners(loads: Sequence[_Load], critical: Floats, fall: Floats) -> _Corners:
-    """Return what follows from each of these pairs of corners, over the largest compression."""
-    cost, numbers = np.zeros(len(critical)), []
-    begin, length = critical[:, np.newaxis], fall[:, np.newaxis]
-    for compression, force in loads:
-        beyond = compression - begin
+    normal, right, squares = np.tile(RIDGE, (len(critical), 1, 1)), np.zeros((len(critical), 4)), 0.0
+    for load in loads:
+        compression = load.compression / depth
+        beyond = compression - critical[:, np.newaxis]
+        length = fall[:, np.newaxis]
         columns = np.stack(
             [
                 np.ones_like(beyond),
-                np.minimum(compression, begin),
+                np.minimum(compression, critical[:, np.newaxis]),
                 -np.clip(beyond / length, 0.0, 1.0),
                 np.maximum(beyond - length, 0.0),
             ],
             axis=1,
         )
-        normal = columns @ columns.transpose(0, 2, 1) + RIDGE
-        solution = np.linalg.solve(normal, columns @ force[:, np.newaxis])
-        residuals = (solution.transpose(0, 2, 1) @ columns)[:, 0] - force
-        cost += np.sum(residuals**2, axis=1)
-        numbers.append(solution[..., 0])
-    median = np.median(numbers, axis=0)
-    offset, k1 = median[:, 0], median[:, 1]
-    snaps = (median[:, 1:].min(axis=1) > LEAST_NUMBER) & (critical * k1 + offset > 0.0)
-    return _Corners(critical, fall, np.where(snaps, cost, np.inf), median)
-
-
-def _start(
-    critical: float, fall: float, _cost: float, numbers: Floats, depth: float, peak_n: float
-) -> FitStart:
-    """Return the start at a pair of corners, with the numbers that follow from them."""
-    offset, k1, drop, k2 = numbers.tolist()
-    # A force at the contact is that of a wider object, whose compression is larger by as much.
-    wider = offset / k1
-    stiffness = peak_n / depth
-    units = (stiffness, depth, peak_n, depth, stiffness)
-    values = np.multiply((k1, float(critical) + wider, drop, float(fall), k2), units)
-    return FitStart(tuple(values.tolist()), wider * depth)
+        normal += columns @ columns.transpose(0, 2, 1)
+        right += columns @ load.force
+        squares += float(load.force @ load.force)
+    numbers = np.linalg.solve(normal, right[:, :, np.newaxis])[:, :, 0]
+    snaps = (numbers[:, 1:].min(axis=1) > LEAST_NUMBER) & (critical * numbers[:, 1] + numbers[:, 0] > 0.0)
+    cost = np.where(snaps, squares - np.sum(numbers * right, axis=1), np.inf)
+    grid = cost.reshape(len(CRITICAL), len(FALL))
+    bordered = np.pad(grid, 1, constant_values=np.inf)
+    neighbours = np.lib.stride_tricks.sliding_window_view(bordered, (3, 3)).min(axis=(2, 3))
+    minima = np.flatnonzero((grid <= neighbours) & np.isfinite(grid))
+    best = minima[np.argsort(cost[minima], kind="stable")][:BEST]
+    return [(float(critical[k]), float(fall[k]), numbers[k]) for k in best]
 
 
 def corner_errors(fitted: Fitted) -> Floats:
@@ -151,28 +125,22 @@ def corner_errors(fitted: Fitted) -> Floats:
     where they are.
     """
     labels = [parameter.label for parameter in fitted.candidate.free]
-    if "snap.critical_m" not in labels:
+    if "snap.fall_m" not in labels:
         return np.zeros(len(labels))
     squeezes, values = fitted.squeezes, fitted.by_label
-    ways = [np.abs(np.diff(squeeze.gap_m[squeeze.sample])) for squeeze in squeezes]
-    moving = np.concatenate([way[way > MOVING_SHARE * np.max(way)] for way in ways])
-    share = math.sqrt(1.0 / 6.0)
-    if _on_falling_part(fitted, values["snap.critical_m"], values["snap.fall_m"]) >= LEAST_FALLING:
-        share = 0.0
-    error_m = share * float(np.median(moving)) / math.sqrt(len(squeezes))
+    critical_m, fall_m = values["snap.critical_m"], values["snap.fall_m"]
+    ways, falling = [], 0
+    for squeeze, width in zip(squeezes, fitted.widths_m, strict=True):
+        gap = squeeze.gap_m[squeeze.sample]
+        compression = (width - gap - fitted.model.compressed_m(squeeze.force_n))[squeeze.loading]
+        falling += int(np.sum((compression > critical_m) & (compression < critical_m + fall_m)))
+        way = np.abs(np.diff(gap))
+        ways.append(way[way > MOVING_SHARE * np.max(way)])
+    share = 0.0 if falling >= LEAST_FALLING else math.sqrt(1.0 / 6.0)
+    error_m = share * float(np.median(np.concatenate(ways))) / math.sqrt(len(squeezes))
     errors = {
         "snap.critical_m": error_m,
         "snap.fall_m": math.sqrt(2.0) * error_m,
         "snap.drop_n": error_m * (values["snap.k1_n_m"] + values["snap.k2_n_m"]),
     }
     return np.array([errors.get(label, 0.0) / values[label] for label in labels])
-
-
-def _on_falling_part(fitted: Fitted, critical_m: float, fall_m: float) -> int:
-    """Return how many samples lie on the falling part of a snap-through while the fingers close."""
-    count = 0
-    for squeeze, width in zip(fitted.squeezes, fitted.widths_m, strict=True):
-        closure = width - squeeze.gap_m[squeeze.sample]
-        compression = (closure - fitted.model.compressed_m(squeeze.force_n))[: int(np.argmax(closure)) + 1]
-        count += int(np.sum((compression > critical_m) & (compression < critical_m + fall_m)))
-    return count

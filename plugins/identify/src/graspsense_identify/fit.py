@@ -106,14 +106,9 @@ class Fitted:
         return math.hypot(self.rms, LEAST_ERROR)
 
     @property
-    def parameters(self) -> int:
-        """The number of its free parameters, the lag included."""
-        return len(self.values) + int(self.has_lag)
-
-    @property
     def information(self) -> float:
         """Half of the Bayesian information criterion, less a constant: smaller is better."""
-        return information(self.rms, self.parameters, len(self.residuals))
+        return information(self.rms, len(self.values) + int(self.has_lag), len(self.residuals))
 
     @property
     def by_label(self) -> dict[str, float]:
@@ -165,9 +160,7 @@ def fit(model: ForwardModel, candidate: CandidateLaw, squeezes: Sequence[Squeeze
     if len(vectors) > STARTS:
         costs = [np.sum(problem.residuals(vector) ** 2) for vector in vectors]
         vectors = [vectors[int(k)] for k in np.argsort(costs)[:STARTS]]
-    for start in candidate.more_starts:
-        wider = start.wider_m / problem.depths
-        vectors.append(np.concatenate([np.log(start.values), wider, zeros[problem.n :]]))
+    vectors += [np.concatenate([np.log(values), zeros]) for values in candidate.more_starts]
     return problem.solved(vectors)
 
 

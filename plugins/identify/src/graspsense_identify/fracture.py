@@ -25,6 +25,8 @@ from graspsense_identify.prepare import BREAK_SHARE, Squeeze
 
 Floats = NDArray[np.float64]
 
+LIMITS: Final = ("force_n", "compression_m")
+"""What an object may bear until it breaks."""
 LEAST_BROKEN: Final = 3
 """Objects that have to break before their spread is identified."""
 SMALLEST_SPREAD: Final = 1e-4
@@ -52,22 +54,20 @@ def fracture_of(fitted: Fitted, force_scatter: float = 0.0) -> IdentifiedFractur
 
     `force_scatter`: standard deviation of the logarithm of the force's scale between squeezes.
     """
-    breaks: dict[str, list[float]] = {"force_n": [], "compression_m": []}
-    survived: dict[str, list[float]] = {"force_n": [], "compression_m": []}
-    errors: dict[str, list[float]] = {"force_n": [], "compression_m": []}
+    courses = [_whole(fitted, i) for i in range(len(fitted.squeezes))]
+    breaks, survived, errors = ({name: list[float]() for name in LIMITS} for _ in range(3))
     left = []
-    for i, squeeze in enumerate(fitted.squeezes):
-        courses = _whole(fitted, i)
-        last = squeeze.sample[-1]
-        for name, course in courses.items():
+    for squeeze, course in zip(fitted.squeezes, courses, strict=True):
+        for name, values in course.items():
+            last, after = float(values[squeeze.sample[-1]]), float(values[-1])
             if squeeze.broken_n is None:
-                survived[name].append(float(np.max(course)))
+                survived[name].append(float(np.max(values)))
                 continue
-            breaks[name].append(0.5 * float(course[last] + course[-1]))
             # Anywhere between the two measurements.
-            errors[name].append(abs(math.log(float(course[-1]) / float(course[last]))) / math.sqrt(12.0))
+            breaks[name].append(0.5 * (last + after))
+            errors[name].append(abs(math.log(after / last)) / math.sqrt(12.0))
         if squeeze.broken_n is not None:
-            left.append(squeeze.broken_n / max(float(courses["force_n"][-1]), 1e-9))
+            left.append(squeeze.broken_n / max(float(course["force_n"][-1]), 1e-9))
     broken = len(left)
     if not broken:
         return IdentifiedFracture([], [])

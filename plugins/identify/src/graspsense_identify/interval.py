@@ -58,8 +58,8 @@ def identified(name: str, value: float, interval: tuple[float, float], basis: st
     return IdentifiedParameter(name=name, unit=unit, value=value, low=low, high=high, basis=basis)
 
 
-def identified_mean(name: str, values: ArrayLike) -> IdentifiedParameter:
-    """Return the mean of a quantity of each squeeze; a single one has no interval."""
+def identified_mean(name: str, values: ArrayLike, what: str = "squeezes") -> IdentifiedParameter:
+    """Return the mean of a quantity of each squeeze, or of each object; a single one has no interval."""
     v = np.asarray(values, dtype=np.float64)
-    basis = f"between {len(v)} squeezes" if len(v) > 1 else "one squeeze: no interval"
+    basis = f"between {len(v)} {what}" if len(v) > 1 else "one squeeze: no interval"
     return identified(name, float(v.mean()), interval_of_mean(v), basis)

@@ -21,6 +21,8 @@ SLOTS: Final = ("elastic", "rigid", "maxwell", "loss", "foam", "snap")
 """The terms of the compiled law, of which a candidate switches some on. All candidates share its code."""
 ELASTIC, RIGID, MAXWELL, LOSS, FOAM, SNAP = range(len(SLOTS))
 MAX_STARTS: Final = 40
+NO_FALL: Final = 1e-4
+"""Length of the fall of a law with two slopes, over the compression."""
 
 
 class DataScale(NamedTuple):
@@ -28,25 +30,22 @@ class DataScale(NamedTuple):
 
     force_n: float
     depth_m: float
-    load_s: float
+    speed_m_s: float
+    """The speed of the compression."""
     memory_s: float
     """The longest time over which a memory of the object shows: the compression and the hold."""
     sample_s: float
     """Time between samples of the force."""
 
-    @property
-    def speed_m_s(self) -> float:
-        """The speed of the compression."""
-        return self.depth_m / max(self.load_s, 1e-3)
-
 
 def scale_of(squeezes: Sequence[Squeeze]) -> DataScale:
     """Return the size of these squeezes."""
     times = [squeeze.stretches for squeeze in squeezes]
+    depth_m = float(np.median([squeeze.depth_m for squeeze in squeezes]))
     return DataScale(
         force_n=float(np.median([squeeze.peak_n for squeeze in squeezes])),
-        depth_m=float(np.median([squeeze.depth_m for squeeze in squeezes])),
-        load_s=float(np.median([timing.load_s for timing in times])),
+        depth_m=depth_m,
+        speed_m_s=depth_m / max(float(np.median([timing.load_s for timing in times])), 1e-3),
         memory_s=max(timing.load_s + timing.hold_s for timing in times),
         sample_s=float(np.median([np.median(np.diff(squeeze.t_s[squeeze.sample])) for squeeze in squeezes])),
     )
@@ -82,22 +81,13 @@ class FreeParameter:
         return self.name in TERMS[self.slot].stiffnesses
 
 
-class FitStart(NamedTuple):
-    """Where a fit starts."""
-
-    values: tuple[float, ...]
-    """Of the free parameters."""
-    wider_m: float
-    """By how much the objects are wider than the first estimate."""
-
-
 @frozen(kw_only=True)
 class CandidateLaw:
     """Terms with free and fixed parameters."""
 
     free: tuple[FreeParameter, ...]
     fixed: Mapping[tuple[int, str], float] = field(factory=dict)
-    more_starts: tuple[FitStart, ...] = ()
+    more_starts: tuple[tuple[float, ...], ...] = ()
     """Where a fit starts besides the combinations of the starts of each parameter."""
 
     @cached_property
@@ -112,7 +102,9 @@ class CandidateLaw:
         for slot in self.slots:
             cubic = [parameter.sign for parameter in self.free if parameter.name == "k3_n_m3"]
             form = "softening" if cubic == [-1.0] else "k1, k3" if cubic else "k1"
-            words.append(f"elastic ({form})" if slot == ELASTIC else SLOTS[slot])
+            kinks = (SNAP, "fall_m") in self.fixed
+            bent = f"{SLOTS[slot]} (two slopes)" if slot == SNAP and kinks else SLOTS[slot]
+            words.append(f"elastic ({form})" if slot == ELASTIC else bent)
         return " + ".join(words)
 
     def joined(self, other: CandidateLaw) -> CandidateLaw:
@@ -184,11 +176,19 @@ def static_candidates(scale: DataScale) -> list[CandidateLaw]:
         _free(SNAP, "fall_m", depth, (0.01, 2.0), 0.1, 0.3),
         _free(SNAP, "k2_n_m", k, (0.01, 100.0), 1.0),
     )
+    slopes = (
+        _free(SNAP, "k1_n_m", k, (0.01, 100.0), 0.6, 1.2, 2.0),
+        _free(SNAP, "critical_m", depth, (0.03, 1.0), 0.2, 0.35, 0.5, 0.65, 0.8),
+        _free(SNAP, "k2_n_m", k, (0.01, 100.0), 0.4, 2.0),
+    )
+    # A shell that falls by nothing, over a length that no recording shows.
+    no_fall = {(SNAP, "drop_n"): 0.0, (SNAP, "fall_m"): float(f"{NO_FALL * depth:.2g}")}
     return [
         CandidateLaw(free=(k1,)),
         CandidateLaw(free=(hertz,)),
         CandidateLaw(free=(k1, k3)),
         CandidateLaw(free=(stiffer, softening)),
+        CandidateLaw(free=slopes, fixed=no_fall),
         CandidateLaw(free=foam, fixed={(FOAM, "at_m"): float(f"{depth:.2g}")}),
         CandidateLaw(free=snap),
     ]

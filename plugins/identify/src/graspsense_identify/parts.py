@@ -124,6 +124,16 @@ def has_objects(squeezes: Sequence[Squeeze]) -> bool:
     return "" not in names and len(names) >= LEAST_INSTANCES
 
 
+def means_of_objects(squeezes: Sequence[Squeeze], values: Sequence[float]) -> list[float]:
+    """Return the mean of a quantity over the squeezes of each object, which differ less than objects do."""
+    if not has_objects(squeezes):
+        return list(values)
+    by_object: dict[str, list[float]] = {}
+    for squeeze, value in zip(squeezes, values, strict=True):
+        by_object.setdefault(squeeze.instance, []).append(value)
+    return [float(np.mean(own)) for own in by_object.values()]
+
+
 def _predicted_rms(fitted: Fitted, squeeze: Squeeze, width_m: float, own_stiffness: bool) -> float:
     """Return the rms residual over the peak of a squeeze that was not fitted. `width_m`: the width to start from."""
     from scipy.optimize import least_squares

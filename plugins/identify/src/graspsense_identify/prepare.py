@@ -31,10 +31,8 @@ CONTACT_SHARE: Final = 0.03
 """The share of the peak force above which the object counts as touched."""
 NOISE_FACTOR: Final = 5.0
 """Multiple of the noise above which the object counts as touched."""
-SCATTER: Final = 1.4826 / math.sqrt(2.0)
-"""Standard deviation of white noise over the median difference of two neighbouring samples."""
 BENT: Final = 1.4826 / math.sqrt(6.0)
-"""The same over the median second difference, to which a steady rise adds nothing."""
+"""Standard deviation of white noise over the median second difference, to which a steady rise adds nothing."""
 BEFORE_S: Final = 0.05
 """The path begins at least this long before the force exceeds the threshold."""
 BEFORE_SHARE: Final = 0.8
@@ -203,12 +201,10 @@ def prepared(
 
 def _contact(name: str, forces: Floats, peak: float) -> tuple[float, NDArray[np.int64]]:
     """Return the force from which on the object counts as touched, and the samples beyond it. Raises NoSqueeze."""
-    scatter = SCATTER * float(np.median(np.abs(np.diff(forces)))) if len(forces) > MIN_SAMPLES else 0.0
+    scatter = _noise(forces) if len(forces) > MIN_SAMPLES else 0.0
     onset = int(np.argmax(forces > CONTACT_SHARE * peak))
-    noise = float(np.std(forces[: max(onset - 2, 0)])) if onset > 6 else 0.0
-    if onset <= 6 and len(forces) > MIN_SAMPLES:
-        # Noise beyond the share of the peak is no contact, and hides where the recording begins.
-        noise = _noise(forces)
+    # Noise beyond the share of the peak is no contact, and hides where the recording begins.
+    noise = float(np.std(forces[: onset - 2])) if onset > 6 else scatter
     threshold = max(CONTACT_SHARE * peak, NOISE_FACTOR * noise)
     touching = np.flatnonzero(forces > threshold)
     if peak <= NOISE_FACTOR * scatter or not len(touching):

@@ -23,7 +23,7 @@ from graspsense_identify.forward import ForwardModel, path_forces
 from graspsense_identify.fracture import explained_falls, fracture_of, not_broken, of_whole_objects
 from graspsense_identify.interval import identified, identified_mean
 from graspsense_identify.laws import scale_of
-from graspsense_identify.parts import parts_of
+from graspsense_identify.parts import has_objects, means_of_objects, parts_of
 from graspsense_identify.prepare import NoSqueeze, Squeeze, prepared
 from graspsense_identify.refuse import PADS_DIFFER, refusals, shows_memory, undetermined
 from graspsense_identify.share import WHOLE, Shares, measured_shares
@@ -316,7 +316,8 @@ def _values(
     fitted: Fitted, intervals: Uncertainty, shares: Shares
 ) -> tuple[dict[str, float], list[IdentifiedParameter]]:
     """Return the keys of the scene's object, and every identified parameter."""
-    parameters = [identified_mean("width_m", fitted.widths_m)]
+    what = "objects" if has_objects(fitted.squeezes) else "squeezes"
+    parameters = [identified_mean("width_m", means_of_objects(fitted.squeezes, fitted.widths_m), what)]
     if len(shares.known):
         parameters.append(identified_mean("share", shares.known))
     for i, parameter in enumerate(fitted.candidate.free):

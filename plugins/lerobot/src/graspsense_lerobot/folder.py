@@ -56,14 +56,14 @@ class DataColumn:
 
 @frozen(kw_only=True, eq=False)
 class Episode:
-    """The frames of an episode, its task, and the videos that show it.
+    """The frames of an episode, the task of each, and the videos that show it.
 
     `videos` has the path of each video within the folder, and the time (s) of its first frame of the episode.
     """
 
     index: int
     table: ColumnTable
-    task: str
+    tasks: Sequence[str]
     videos: Mapping[str, tuple[str, float]]
 
 
@@ -219,18 +219,19 @@ class Folder:
                 f"{self.place}/{path} has {int(kept.sum())} frames of episode {index}, and meta/episodes says {length}"
             )
         frames = table.rows(np.flatnonzero(kept))
-        return Episode(index=index, table=frames, task=self._task(frames, index), videos=self._videos(row))
+        return Episode(index=index, table=frames, tasks=self._tasks(frames, index), videos=self._videos(row))
 
-    def _task(self, frames: ColumnTable, index: int) -> str:
+    def _tasks(self, frames: ColumnTable, index: int) -> list[str]:
         numbers = frames.numbers.get("task_index")
         if numbers is None or not np.isfinite(numbers).all():
-            return ""
-        number = int(numbers[0])
-        if number not in self.tasks:
+            return [""] * len(frames)
+        tasks = [self.tasks.get(int(number)) for number in numbers]
+        if None in tasks:
             raise DataDamaged(
-                f"{self.place}: episode {index} has task_index {number}, and meta/tasks has {len(self.tasks)} tasks"
+                f"{self.place}: episode {index} has task_index {int(numbers[tasks.index(None)])}, and meta/tasks has "
+                f"{len(self.tasks)} tasks"
             )
-        return self.tasks[number]
+        return [task or "" for task in tasks]
 
     def _videos(self, row: Mapping[str, Any]) -> dict[str, tuple[str, float]]:
         videos = {}
@@ -293,18 +294,11 @@ def _feature(place: Path, key: str, value: Any) -> DataColumn:
 def _flat(names: Any) -> tuple[str, ...]:
     """Return names that are in a list, in lists of a list, or in the lists of a table by the kind of motor."""
     if isinstance(names, dict):
-        names = (
-            list(names.values())
-            if all(isinstance(part, list | dict) for part in names.values())
-            else list(names)
-        )
+        nested = all(isinstance(part, list | dict) for part in names.values())
+        return _flat(list(names.values()) if nested else list(names))
     if isinstance(names, list):
-        return tuple(
-            name
-            for part in names
-            for name in (_flat(part) if isinstance(part, list | dict) else (str(part),))
-        )
-    return ()
+        return tuple(name for part in names for name in _flat(part))
+    return () if names is None else (str(names),)
 
 
 def _json(text: str, where: str) -> dict[str, Any]:

@@ -78,19 +78,13 @@ def notices_of(understood: Understood, episode: Episode) -> Iterator[str]:
 
 def moments_of(columns: GraspColumns) -> str:
     """Return when the gripper begins to close and when it touches, in words."""
-    known = np.isfinite(columns.force_n) & np.isfinite(columns.gap_m)
-    if not known.any():
-        return "no contact is found in the force"
-    columns = columns.rows(known)
+    columns = columns.rows(np.isfinite(columns.force_n) & np.isfinite(columns.gap_m))
     force, gap = columns.force_n, columns.gap_m
-    low = float(np.nanmin(force))
-    touched = force > low + TOUCHED * (float(np.nanmax(force)) - low)
-    if not touched.any():
+    if not len(force) or float(np.ptp(force)) == 0.0:
         return "no contact is found in the force"
-    contact = int(touched.argmax())
-    widest = float(np.nanmax(gap[: contact + 1]))
-    near = np.flatnonzero(gap[: contact + 1] >= widest - 0.02 * float(np.ptp(gap)))
-    closing = int(near[-1]) if len(near) else 0
+    contact = int((force > force.min() + TOUCHED * np.ptp(force)).argmax())
+    free = gap[: contact + 1]
+    closing = int(np.flatnonzero(free >= free.max() - 0.02 * np.ptp(gap))[-1])
     return (
         f"closing from {columns.t_s[closing]:.3f} s of the episode, contact at {columns.t_s[contact]:.3f} s"
     )

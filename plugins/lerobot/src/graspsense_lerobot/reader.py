@@ -46,11 +46,11 @@ def recordings(place: str) -> Iterator[LabelledRecording | UnreadableRecording]:
     """Yield every squeeze of every episode, with its task as the label. Raises ConfigError, DataDamaged."""
     path, options = folder_and_options(place)
     understood = understand(read_folder(path), options)
-    for episode in understood.folder.episodes():
-        if isinstance(episode, UnreadableRecording):
-            yield episode
+    for part in _parts(understood):
+        if isinstance(part, UnreadableRecording):
+            yield part
         else:
-            yield from each_readable(f"episode {episode.index}", partial(_of_episode, understood, episode))
+            yield from each_readable(part[2].source, partial(_grasp, understood, *part))
 
 
 def numbered_parts(place: str, folder: Path) -> Iterator[tuple[int, GraspColumns] | None]:
@@ -58,16 +58,19 @@ def numbered_parts(place: str, folder: Path) -> Iterator[tuple[int, GraspColumns
 
     The times are those of the episode. The place gives the options. Raises ConfigError, DataDamaged.
     """
-    understood = understand(read_folder(folder), folder_and_options(place)[1])
+    for part in _parts(understand(read_folder(folder), folder_and_options(place)[1])):
+        yield None if isinstance(part, UnreadableRecording) else (part[0].index, part[2])
+
+
+def _parts(understood: Understood) -> Iterator[tuple[Episode, int, GraspColumns] | UnreadableRecording]:
+    """Yield each squeeze of each episode, with its number in the episode; of a damaged one the reason."""
     for episode in understood.folder.episodes():
         if isinstance(episode, UnreadableRecording):
-            yield None
+            yield episode
             continue
-        for part in each_readable(f"episode {episode.index}", partial(frames_of, understood, episode)):
-            if isinstance(part, UnreadableRecording):
-                yield None
-            else:
-                yield episode.index, part
+        squeezes_of = partial(frames_of, understood, episode)
+        for k, part in enumerate(each_readable(f"episode {episode.index}", squeezes_of)):
+            yield part if isinstance(part, UnreadableRecording) else (episode, k, part)
 
 
 @np.errstate(all="ignore")  # what is infinite is refused by `checked_recording`
@@ -99,41 +102,29 @@ def label_of_task(task: str) -> str:
     return re.sub(r"[:#,]", "-", re.sub(r"\s+", "_", task.strip().rstrip(".")))
 
 
-def _of_episode(
-    understood: Understood, episode: Episode
-) -> Iterator[LabelledRecording | UnreadableRecording]:
-    with np.errstate(all="ignore"):
-        notices = tuple(notices_of(understood, episode))
-    for k, squeeze in enumerate(frames_of(understood, episode)):
-        yield from each_readable(
-            squeeze.source, partial(_grasp, understood, episode, evolve(squeeze, warnings=notices), k)
-        )
-
-
 @np.errstate(all="ignore")
 def _grasp(
-    understood: Understood, episode: Episode, columns: GraspColumns, number: int
+    understood: Understood, episode: Episode, number: int, columns: GraspColumns
 ) -> tuple[LabelledRecording]:
     start_s = float(columns.t_s[0])
+    frame = int(np.searchsorted(times_of(understood, episode), start_s))
     where = [
         f"video {key}: {path}, from {first_s + start_s:.3f} s"
         + ("" if (understood.folder.place / path).is_file() else ", which is missing")
         for key, (path, first_s) in episode.videos.items()
     ]
-    of_gap = tuple(notices_of_gap(columns))
     moved = evolve(
         columns,
         t_s=columns.t_s - start_s,
         notes=(*understood.notes, *columns.notes, moments_of(columns), *where),
     )
-    recording = checked_recording(moved)
     return (
         LabelledRecording(
-            recording=recording,
+            recording=checked_recording(moved),
             source=columns.source,
-            label=label_of_task(episode.task),
+            label=label_of_task(episode.tasks[frame]),
             order=episode.index + number / 1000.0,
-            notices=(*columns.warnings, *of_gap),
+            notices=(*notices_of(understood, episode), *columns.warnings, *notices_of_gap(columns)),
         ),
     )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 from typing import Final
 
@@ -48,7 +49,7 @@ class Understood:
 
 def understand(folder: Folder, options: PlaceOptions) -> Understood:
     """Return what the names of a data set mean. Raises ConfigError if the opening or a force is not found."""
-    names = [name for feature in _vectors(folder) for name in _names(feature)]
+    names = [name for _, own in _named(folder) for name in own]
     images = tuple(
         column
         for column in folder.features.values()
@@ -57,6 +58,12 @@ def understand(folder: Folder, options: PlaceOptions) -> Understood:
     for what, given in (("gap", options.gap), *(("force", name) for name in options.force.split(","))):
         _refuse_unknown(given, names, what)
     meaning = meaning_of(names, options.gap, options.force)
+    counts = Counter(names)
+    if twice := [name for name in counts if counts[name] > 1 and name not in meaning.others]:
+        raise DataDamaged(
+            f"{folder.place}: meta/info.json gives {some(twice)} to several numbers of a feature: give each a name of "
+            "its own, as in left_gripper.pos"
+        )
     gap = next(iter(meaning.gap), "")
     if not gap:
         raise ConfigError(
@@ -97,9 +104,9 @@ def understand(folder: Folder, options: PlaceOptions) -> Understood:
 def numbers_of(folder: Folder, episode: Episode) -> dict[str, Numbers]:
     """Return the numbers of an episode by name. Raises DataDamaged if a column is not as it is declared."""
     numbers: dict[str, Numbers] = {}
-    for feature in _vectors(folder):
+    for feature, names in _named(folder):
         values = numbers_of_feature(folder, feature, episode)
-        numbers |= {name: values[:, k] for k, name in enumerate(_names(feature))}
+        numbers |= {name: values[:, k] for k, name in enumerate(names)}
     return numbers
 
 
@@ -121,11 +128,17 @@ def numbers_of_feature(folder: Folder, feature: DataColumn, episode: Episode) ->
     return rows
 
 
-def _vectors(folder: Folder) -> list[DataColumn]:
-    return [
-        feature
+def _named(folder: Folder) -> list[tuple[DataColumn, list[str]]]:
+    """Return each vector of the observations with a name for each number; one of several has its feature before it."""
+    named = [
+        (feature, _names(feature))
         for feature in folder.features.values()
         if feature.key.startswith("observation.") and _is_number(feature) and len(feature.shape) == 1
+    ]
+    counts = Counter(name for _, names in named for name in set(names))
+    return [
+        (feature, [f"{_word(feature)}.{name}" if counts[name] > 1 else name for name in names])
+        for feature, names in named
     ]
 
 
@@ -134,8 +147,8 @@ def _is_number(feature: DataColumn) -> bool:
 
 
 def _names(feature: DataColumn) -> list[str]:
-    """Return a name for each number of a vector, unlike those of other features."""
-    word = feature.key.removeprefix("observation.").removeprefix("state.")
+    """Return a name for each number of a vector."""
+    word = _word(feature)
     given = feature.names if len(feature.names) == feature.shape[0] else ()
     if feature.key == "observation.state":
         return list(given) or [f"state.{k}" for k in range(feature.shape[0])]
@@ -148,12 +161,16 @@ def _names(feature: DataColumn) -> list[str]:
     return [f"{word}.{name}" for name in given or map(str, range(feature.shape[0]))]
 
 
+def _word(feature: DataColumn) -> str:
+    return feature.key.removeprefix("observation.").removeprefix("state.")
+
+
 def units_of(folder: Folder) -> dict[str, str]:
     """Return the unit of each number that has one in the metadata."""
     return {
         name: unit
-        for feature in _vectors(folder)
-        for name, unit in zip(_names(feature), feature.units, strict=False)
+        for feature, names in _named(folder)
+        for name, unit in zip(names, feature.units, strict=False)
     }
 
 

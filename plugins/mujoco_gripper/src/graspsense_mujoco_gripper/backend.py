@@ -49,13 +49,14 @@ from graspsense_mujoco_gripper.camera import Camera, Window, free_camera, offscr
 from graspsense_mujoco_gripper.catalogue import catalogue
 from graspsense_mujoco_gripper.config import MujocoConfig
 from graspsense_mujoco_gripper.draft import Draft, drafted
-from graspsense_mujoco_gripper.drive import OTHER_GAP, ActuatorDrive, Travel, instability
+from graspsense_mujoco_gripper.drive import ActuatorDrive, Travel, instability
 from graspsense_mujoco_gripper.gripper_file import GripperFile, read_gripper
 from graspsense_mujoco_gripper.measurement import (
     ForceGauge,
     Palm,
     SpringCells,
     cells_of,
+    faces,
     gap_reader,
     geoms_of,
     plain,
@@ -77,10 +78,18 @@ DEEPEST_M: Final = 1e-3
 TOUCH_N: Final = 0.1
 """Force on both fingers from which on the motion of the scene begins: less may be the palm that swings."""
 UNFELT_N: Final = 1.0
-"""A thing that is squeezed by more, before a finger has felt `TOUCH_N`, is touched beside what measures. When both
+"""A thing that is squeezed by more, before both fingers have felt `TOUCH_N`, is touched beside what measures. When both
 fingers feel as much, the gap is compared with the width of the thing between them."""
 OTHER_WIDTH: Final = 0.15
 """By more than this share of the opening, the gap is not where fingers hold a thing; of some that tilt by 0.12."""
+SIDES: Final = ("left", "right")
+SHOWN_SHARE: Final = 0.8
+"""A sensor that shows less of the force on a finger does not cover it; so long after the contact, nothing swings."""
+SETTLED_S: Final = 0.1
+OTHER_WIDTH_M: Final = 3e-3
+"""Nor is it by more than this, where fingers press at the points that the gap is measured between."""
+TILT: Final = 0.5
+"""A finger that presses beside its point may tilt: this is the most of it by which the gap then differs."""
 MANY: Final = 256
 """Errors of the forces that are drawn at once."""
 MOST_KNOWN: Final = 16
@@ -267,8 +276,11 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         self._gap_m, self._rate_m_s = self._measured_gap_m(), 0.0
         self._drive.reset(self._gap_m)
         self._command = Command(EFFORT, 0.0, inf, inf)
-        self._ticks, self._swings, self._broken, self._greatest_n = 0, 0, False, 0.0
-        self._is_gap_checked = isinstance(self._forces, SpringCells)
+        self._ticks, self._swings, self._broken, self._felt_n = 0, 0, False, (0.0, 0.0)
+        self._unchecked = [] if isinstance(self._forces, SpringCells) else [(0, self._check_gap)]
+        if isinstance(self._forces, ForceGauge) and self._forces.has_sensors:
+            self._unchecked.append((ceil(SETTLED_S * self.config.rate_hz), self._check_sensors))
+        self._held_ticks = 0
         self._measured_m = self._rounded(self._gap_m)
 
     def _check_start(self, data: mujoco.MjData) -> None:
@@ -344,11 +356,14 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         velocity = (measured_m - self._measured_m) / tick_s
         self._measured_m = measured_m
         left, right = self._forces.forces_n()
-        self._greatest_n = max(self._greatest_n, left, right)
-        if data.ncon and not TOUCH_N <= self._greatest_n < self._most_n:
+        felt_left_n, felt_right_n = self._felt_n
+        self._felt_n = max(felt_left_n, left), max(felt_right_n, right)
+        if data.ncon and not (min(self._felt_n) >= TOUCH_N and max(self._felt_n) < self._most_n):
             self._check_felt()
-        if not self._is_gap_checked and min(left, right) > UNFELT_N:
-            self._check_gap()
+        if self._unchecked and min(left, right) > UNFELT_N:
+            if self._held_ticks >= self._unchecked[0][0]:
+                self._unchecked.pop(0)[1]()
+            self._held_ticks += 1
         t_s = self._ticks * tick_s
         if self._motion.moves:
             self._motion.set(data, t_s, touched=min(left, right) > TOUCH_N)
@@ -380,25 +395,44 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         return Reading(frame, pads, signals)
 
     def _check_felt(self) -> None:
-        """Raise DeviceLost where the thing is squeezed, and no finger feels it, or not all of it."""
-        if self._greatest_n >= self._most_n:
+        """Raise DeviceLost where the thing is squeezed, and a finger does not feel it, or not all of it."""
+        if max(self._felt_n) >= self._most_n:
             raise DeviceLost(
-                f"a finger feels {self._greatest_n:.3g} N, and a sensor has a cutoff of {self._most_n:.3g} N "
+                f"a finger feels {max(self._felt_n):.3g} N, and a sensor has a cutoff of {self._most_n:.3g} N "
                 "in the model. Raise it, or grasp with less force"
             )
         squeeze_n = self._forces.squeeze_n() if isinstance(self._forces, ForceGauge) else 0.0
         if squeeze_n > UNFELT_N:
+            deaf = [side for side, felt_n in zip(SIDES, self._felt_n, strict=True) if felt_n < TOUCH_N]
             raise DeviceLost(
-                f"the gripper squeezes {self.config.object} with {squeeze_n:.3g} N, and no finger feels it. Look at "
-                "the geoms, bodies and sensors of left and right in gripper.file: do they touch, and on which side?"
+                f"the gripper squeezes {self.config.object} with {squeeze_n:.3g} N, which is not felt on the "
+                f"{' and the '.join(deaf)}. Look at the geoms, bodies and sensors of left and right in gripper.file: "
+                "do they touch, and on which side?"
             )
+
+    def _check_sensors(self) -> None:
+        """Raise DeviceLost where the sensor of a finger shows only a part of the force on its geoms."""
+        assert isinstance(self._forces, ForceGauge)
+        for side, shown_n, borne_n in zip(
+            SIDES, self._forces.forces_n(), self._forces.borne_n(), strict=True
+        ):
+            if borne_n > UNFELT_N and shown_n < SHOWN_SHARE * borne_n:
+                raise DeviceLost(
+                    f"the {side} finger bears {borne_n:.3g} N, and its sensor shows {shown_n:.3g} N. Look at the size, "
+                    "the place and the body of the site of the sensor in the model: it has to cover the whole finger"
+                )
 
     def _check_gap(self) -> None:
         """Raise DeviceLost where the gap is not the width of what the fingers press on."""
-        self._is_gap_checked = True
-        held_m = self._forces.held_m() if isinstance(self._forces, ForceGauge) else nan
-        share = OTHER_GAP if self._gripper.gap.joint else OTHER_WIDTH
-        if abs(self._gap_m - held_m) > share * self._travel.open_m:
+        assert isinstance(self._forces, ForceGauge)
+        places_m = self._forces.places_m()
+        if not len(places_m):
+            return
+        axis, held_m = self._travel.axis, float(places_m[1, 0] - places_m[0, 0])
+        away = places_m[:, 1:] - faces(self._model, self._opened(), self._gripper)
+        aside_m = float(np.linalg.norm(away - np.outer(away @ axis, axis), axis=1).sum())
+        most_m = min(OTHER_WIDTH * self._travel.open_m, OTHER_WIDTH_M + TILT * aside_m)
+        if abs(self._gap_m - held_m) > most_m:
             raise DeviceLost(
                 f"the gap is {self._gap_m * 1e3:.3g} mm where the fingers press on what is {held_m * 1e3:.3g} mm wide "
                 "(0: on each other). Look at gap in gripper.file, and at margins of geoms in the model"
@@ -445,7 +479,7 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
             return {}
         report: dict[str, float | int | str | bool] = {
             "broken": self._broken,
-            "greatest_force_n": self._greatest_n,
+            "greatest_force_n": max(self._felt_n),
             "steps": self._ticks * self._steps,
         }
         if self._motion.moves:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Set
-from math import copysign, hypot, inf, nan
+from math import copysign, hypot, inf
 from typing import Any, Final
 
 import mujoco
@@ -80,7 +80,7 @@ class ForceGauge:
             for geom in geoms:
                 self._roles[geom] |= role
         self._sensors = [self._sensor(finger, side) for finger, side in zip(fingers, SIDES, strict=True)]
-        self._by_contacts = None in self._sensors
+        self._by_contacts, self.has_sensors = None in self._sensors, any(self._sensors)
         numbers = [identifier(model, "sensor", finger.sensor) for finger in fingers if finger.sensor]
         bodies = {int(model.site_bodyid[model.sensor_objid[number]]) for number in numbers}
         if len(bodies) < len(numbers):
@@ -114,13 +114,18 @@ class ForceGauge:
 
     def forces_n(self) -> tuple[float, float]:
         """Return the force on the left and on the right finger along the closing direction."""
+        left, right = self.borne_n() if self._by_contacts else (0.0, 0.0)
+        by_left, by_right = self._sensors
+        return left if by_left is None else by_left(), right if by_right is None else by_right()
+
+    def borne_n(self) -> tuple[float, float]:
+        """Return the same by the contacts, whatever the sensors show."""
         left = right = 0.0
-        if self._by_contacts and self._data.ncon:
+        if self._data.ncon:
             for _, on_left, on_right in self._contacts():
                 left += on_left
                 right += on_right
-        by_left, by_right = self._sensors
-        return left if by_left is None else by_left(), right if by_right is None else by_right()
+        return left, right
 
     def _contacts(self) -> Iterator[tuple[int, float, float]]:
         """Yield the number of each contact of a finger, and its force on the left and on the right one."""
@@ -134,17 +139,17 @@ class ForceGauge:
             along = rows[3 * k] * force[0] + rows[3 * k + 1] * force[1] + rows[3 * k + 2] * force[2]
             yield k, signs[0] * along, signs[1] * along
 
-    def held_m(self) -> float:
-        """Return how wide the thing is where both fingers press on it, or 0 where they press on each other.
+    def places_m(self) -> Floats:
+        """Return where each finger presses: the thing's surface along the closing direction, x, y and z, a row each.
 
-        NaN where one of them presses on nothing. With a margin, a thing is pressed before it is reached.
+        There are no rows where one presses on nothing. With a margin, a thing is pressed before it is reached.
         """
-        contact, axis, moments = self._data.contact, self._axis, np.zeros((2, 2))
+        contact, axis, moments = self._data.contact, self._axis, np.zeros((2, 5))
         for k, on_left, on_right in self._contacts():
-            place_m = contact.pos[k] @ axis + copysign(max(contact.dist[k], 0.0) / 2.0, on_left - on_right)
-            moments += np.outer((on_left, on_right), (1.0, place_m))
-        (left_n, left_nm), (right_n, right_nm) = moments
-        return float(right_nm / right_n - left_nm / left_n) if left_n > 0.0 and right_n > 0.0 else nan
+            surface_m = contact.pos[k] @ axis + copysign(max(contact.dist[k], 0.0) / 2.0, on_left - on_right)
+            moments += np.outer((on_left, on_right), (1.0, surface_m, *contact.pos[k]))
+        places: Floats = moments[:, 1:] / moments[:, :1] if min(moments[:, 0]) > 0.0 else moments[:0]
+        return places
 
     def squeeze_n(self) -> float:
         """Return the force that squeezes a thing along the closing direction, by whatever parts of the gripper move."""
