@@ -11,6 +11,7 @@ from math import inf, isfinite
 from typing import Any, Final, NamedTuple, get_type_hints
 
 import numpy as np
+from numpy.typing import NDArray
 
 from graspsense.core.compiling.call_graph import NotCompilable, fingerprint
 from graspsense.core.components.channels import can_change, further, no_signals, read_only
@@ -56,6 +57,8 @@ ASKED: Final = (
     "contact_force_n",
 )
 """The methods by which a law says what it asks of a gripper."""
+LATEST_S: Final = 0.06
+"""The time (s) by which a law of times may command later on a gripper with another rate."""
 FORCES: Final = slice(5, 9)
 """The forces of a frame, on pads and edges."""
 
@@ -345,12 +348,36 @@ def independent_of_the_start_of_the_clock(subject: Subject) -> None:
 
 
 def times_are_those_of_the_clock(subject: Subject) -> None:
-    """On a gripper with half the rate, a grasp takes about as long and ends as at the full rate."""
+    """On a gripper with half the rate, a grasp takes about as long, and is commanded and ends as at the full rate."""
     if any(channel.rate_hz > 0.5 / DT_S for channel in subject.entry.requires):
         raise CheckSkipped("it needs a higher rate")
-    _demand_as_long(
-        subject, ABOUT_AS_LONG, "count seconds by `frame.dt_s` or `frame.t_s`, not ticks", dt_s=2.0 * DT_S
-    )
+    advice = "count seconds by `frame.dt_s` or `frame.t_s`, not ticks"
+    _demand_as_long(subject, ABOUT_AS_LONG, advice, dt_s=2.0 * DT_S)
+    usual, slower = ticks_of(subject), fresh_ticks(subject, clock={"dt_s": 2.0 * DT_S})
+    for phase in (APPROACH, SQUEEZE, HOLD):
+        for name in Command._fields[1:]:
+            late_s = _lateness_s(_course(usual, phase, name), _course(slower, phase, name))
+            demand(
+                late_s <= LATEST_S,
+                f"{name} of its commands in {Phase(phase).name} comes {late_s:.2g} s earlier or later at half the rate: "
+                f"{advice}",
+            )
+
+
+def _course(ticks: Sequence[Tick], phase: int, name: str) -> NDArray[np.float64]:
+    """Return the times (s) since the begin of a phase, and this number of its commands at each: 2 x ticks."""
+    among = [tick for tick in ticks if tick.state.phase == phase]
+    numbers = [(tick.frame.t_s - among[0].frame.t_s, getattr(tick.command, name)) for tick in among]
+    return np.nan_to_num(np.array(numbers).reshape(-1, 2).T, posinf=0.0)
+
+
+def _lateness_s(usual: NDArray[np.float64], other: NDArray[np.float64]) -> float:
+    """Return by how much time a number comes later: the area between its two courses over the greatest value."""
+    both = usual[:, usual[0] <= other[0].max(initial=-1.0)]
+    if both.shape[1] < 2 or not both[1].any():
+        return 0.0
+    apart = np.abs(both[1] - np.interp(both[0], *other))
+    return float(apart[1:] @ np.diff(both[0]) / np.abs(both[1]).max())
 
 
 def _demand_as_long(subject: Subject, most_change: float, advice: str, **clock: float) -> None:
@@ -519,8 +546,10 @@ def ends_every_grasp(subject: Subject) -> None:
             f"{grasp.reason}. Let the state's `outcome` leave RUNNING, after {LONGEST_S:g} s at the latest",
         )
         closest_m, width_m = float(grasp.trace.gap_m.min()), OBJECTS[object_name][0]
+        missed = width_m > 0.0 and grasp.outcome == Outcome.NOTHING_THERE
         demand(
-            grasp.outcome != Outcome.STEADY or closest_m < width_m,
-            f"with {object_name} between the fingers, {width_m * 1e3:g} mm wide, the grasp ended as steady, and the "
-            f"fingers came no closer than {closest_m * 1e3:.1f} mm: hold only what was touched",
+            closest_m < width_m or not (missed or grasp.outcome == Outcome.STEADY),
+            f"with {object_name} between the fingers, {width_m * 1e3:g} mm wide, the grasp ended as "
+            f"{grasp.outcome.words}, and the fingers came no closer than {closest_m * 1e3:.1f} mm: close them until "
+            "they touch, and hold only what was touched",
         )
