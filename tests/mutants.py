@@ -442,7 +442,7 @@ leaving(
 )
 leaving(
     "ends-every-grasp",
-    "hold only what was touched",
+    "only what was touched",
     outcome=lambda after, frame: STEADY if frame.t_s > 0.1 else after.outcome,
     phase=lambda after, frame: HOLD if frame.t_s > 0.1 else after.phase,
 )
@@ -475,7 +475,7 @@ def ramping_step(params, state, reading):
 
 law(
     "times-are-those-of-the-clock",
-    "effort_limit_n of its commands in APPROACH comes",
+    "effort_limit_n of its commands in APPROACH",
     init=lambda self: Ticking(APPROACH, 0, 0),
     step=staticmethod(ramping_step),
 )

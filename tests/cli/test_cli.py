@@ -99,7 +99,7 @@ def test_a_mistake_is_told_on_stderr_with_code_2(run, arguments, said):
 def test_with_json_an_error_is_an_object_on_stdout_too(run):
     ran = run("config", "show", *REPLAY, "-o", "controller.ramp_s=-1", "--json")
 
-    message = "-o controller.ramp_s=-1: 'ramp_s' must be >= 0.0: -1.0"
+    message = "-o controller.ramp_s=-1: expected a number of at least 0, found -1.0"
     assert ran.returncode == 2
     assert ran.stderr == f"graspsense: {message}\n"
     assert ran.json == {"error": {"kind": "ConfigError", "message": message, "exit_code": 2}}

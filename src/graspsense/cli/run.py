@@ -130,7 +130,11 @@ def run(
     if beside is not None:
         _run_beside(settings, beside, save, label)
         return
-    film = _film(picture, video, viewer)
+    film: tuple[Film, ...] = ()
+    if viewer or picture is not None or video is not None:
+        from graspsense.report.film import Film
+
+        film = (Film(picture, video, window=viewer),)
     sinks: tuple[Sink, ...] = film if values_alone() else (LiveRows(), *film)
     with shown_live(live, save) as shown:
         sinks = (*sinks, *shown.sinks)
@@ -273,15 +277,6 @@ def draw_grasp(trial: Trial, path: Path) -> None:
 
     grasp_png(trial, path)
     talk(f"picture written to {path}")
-
-
-def _film(picture: str | None, video: str | None, viewer: bool) -> tuple[Film, ...]:
-    """Return the sink that receives pictures; nothing if none are asked for."""
-    if picture is None and video is None and not viewer:
-        return ()
-    from graspsense.report.film import Film
-
-    return (Film(picture, video, window=viewer),)
 
 
 def _write_film(films: Sequence[Film], save: str | None, kept: dict[str, Any] | None) -> None:

@@ -103,15 +103,12 @@ def stays_within_its_limits(subject: Subject) -> None:
     for name in subject.entry.accepts:
         kind = KINDS.index(name)
         # Fingers that other work on the computer holds up catch up faster, but hardly in a second session.
-        too_fast = _speed_beyond_limit(subject, kind) and _speed_beyond_limit(subject, kind)
-        demand(not too_fast, too_fast)
+        beyond = _beyond_limits(subject, kind) and _beyond_limits(subject, kind)
+        demand(not beyond, beyond)
 
 
-def _speed_beyond_limit(subject: Subject, kind: int) -> str:
-    """Return in words what speed exceeds its limit under the largest commands of this kind; empty if none does.
-
-    An effort beyond its limit fails the check at once.
-    """
+def _beyond_limits(subject: Subject, kind: int) -> str:
+    """Return in words what exceeds its limit under the largest commands of this kind; empty if nothing does."""
     with opened(subject) as (backend, info):
         session = Session(info, opened_s=0.0)
         usual = limits_of(session.info)
@@ -120,20 +117,16 @@ def _speed_beyond_limit(subject: Subject, kind: int) -> str:
         greatest = {VELOCITY: -1e6, POSITION: 0.0, FORCE: 1e6, EFFORT: 1e6}[kind]
         ticks = max(int(0.5 * session.info.rate_hz), 20)
         use(session, backend, "closing hard", ticks, Command(kind, greatest, inf, inf), limits)
-    for frame in session.frames:
-        effort, speed = (
-            f"{name} reaches {abs(value):.3g} under {KINDS[kind]} commands limited to {limit:g}: apply "
-            "`effort_limit_n` and `speed_limit_m_s` of each command"
-            if abs(value) > grace * max(limit, least)
-            else ""
-            for name, value, limit, least, grace in (
-                ("effort_n", frame.effort_n, usual.first_effort_n, backend.least_force_n, 1.1),
-                ("velocity_m_s", frame.velocity_m_s, usual.first_speed_m_s, backend.least_speed_m_s, 3.0),
-            )
-        )
-        demand(not effort, effort)
-        if speed:
-            return speed
+    for name, limit, least, grace in (
+        ("effort_n", usual.first_effort_n, backend.least_force_n, 1.1),
+        ("velocity_m_s", usual.first_speed_m_s, backend.least_speed_m_s, 3.0),
+    ):
+        for value in (getattr(frame, name) for frame in session.frames):
+            if abs(value) > grace * max(limit, least):
+                return (
+                    f"{name} reaches {abs(value):.3g} under {KINDS[kind]} commands limited to {limit:g}: apply "
+                    "`effort_limit_n` and `speed_limit_m_s` of each command"
+                )
     return ""
 
 

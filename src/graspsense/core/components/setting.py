@@ -302,18 +302,12 @@ def _checks(limits: _Limits, default: Any, *, number: bool) -> list[Any]:
     kinds = (validators.ge, validators.gt, validators.le, validators.lt)
     checks += [kind(limit) for kind, limit in zip(kinds, limits, strict=True) if limit is not None]
     if isinstance(default, float) and math.isinf(default):
-        return [*checks, _is_not_nan]
+        return [*checks, validators.ge(-math.inf)]  # which NaN is not
     if number and limits.maximum is None and limits.below is None:
         checks.append(validators.lt(math.inf))
     if number and limits.minimum is None and limits.above is None:
         checks.append(validators.gt(-math.inf))
     return checks
-
-
-def _is_not_nan(instance: Any, attribute: attrs.Attribute[Any], value: Any) -> None:
-    """Raise ValueError for NaN, which no comparison refuses where a number may be infinite."""
-    if value != value:
-        raise ValueError(f"{attribute.name!r} must be a number: {value}")
 
 
 def _is_a_choice(instance: Any, attribute: attrs.Attribute[Any], value: Any) -> None:
