@@ -165,12 +165,10 @@ def _rerun_target(target: str) -> str:
         if os.path.exists(target):
             raise click.UsageError(f"--rerun: {target} already exists: name another file, or move it away")
         return target
-    try:
+    with suppress(ValueError):  # a port that is none
         address = urlsplit(target)
         if address.scheme == "rerun+http" and address.hostname and address.port and address.path == "/proxy":
             return target
-    except ValueError:  # a port that is none
-        pass
     raise click.UsageError(
         f"--rerun is {target!r}: name a file that ends in .rrd, or a viewer as in {RERUN_VIEWER}"
     )

@@ -44,7 +44,6 @@ if TYPE_CHECKING:
     from graspsense.core.grasp.sinks import Sink
     from graspsense.core.settings.resolved import Settings
     from graspsense.core.values.device import DeviceInfo
-    from graspsense.core.values.features import Prediction
     from graspsense.report.film import Film
     from graspsense.store.record_grasp import Beside
 
@@ -162,10 +161,15 @@ def _run_beside(settings: Settings, pipeline: str, save: str | None, label: str 
     """
     from graspsense.core.grasp.pair import run_pair
     from graspsense.store.record_grasp import Beside
+    from graspsense.store.store import Store
 
     other, _ = _settings_to_run(save, label, {"pipeline": pipeline})
     check(other)
-    recordings = _reserved(save)
+    recordings: tuple[Path, ...] = ()
+    if save is not None:
+        with Store.open(save) as store:
+            made_at = datetime.now(UTC).isoformat(timespec="milliseconds")
+            recordings = store.new_recording(made_at), store.new_recording(made_at)
 
     def grasp(member: Member, own: Settings, place: int) -> tuple[Ended, str]:
         if save is None:
@@ -187,17 +191,6 @@ def _run_beside(settings: Settings, pipeline: str, save: str | None, label: str 
             talk(f"kept as trial {kept['trial']} in {save}")
     for trial, interrupted, kept in both:
         finish(trial, interrupted, "" if kept is None else kept["problem"])
-
-
-def _reserved(save: str | None) -> tuple[Path, ...]:
-    """Return the paths of the two recordings of a pair; none where nothing is kept."""
-    from graspsense.store.store import Store
-
-    if save is None:
-        return ()
-    with Store.open(save) as store:
-        made_at = datetime.now(UTC).isoformat(timespec="milliseconds")
-        return store.new_recording(made_at), store.new_recording(made_at)
 
 
 def _as_json(trial: Trial, kept: Mapping[str, Any] | None) -> dict[str, Any]:
@@ -359,7 +352,15 @@ def print_trial(trial: Trial, *, events: bool = True) -> None:
         unit = trial.trace.units["t"]
         echo_entry("event", f"{event.what} at {event.t_s:.3f} {unit} ({event.phase.name.lower()})")
     if trial.prediction is not None:
-        _print_prediction(trial.prediction)
+        prediction = trial.prediction
+        certainty = f"  ({prediction.certainty_in_words})" if prediction.certainty_in_words else ""
+        echo_entry("prediction", f"{prediction.label}{certainty}", prediction_style(prediction.label))
+        if prediction.set_in_words:
+            echo_entry("set", prediction.set_in_words)
+        for i, reason in enumerate(prediction.because):
+            echo_entry("" if i else "because", reason.words)
+        echo_entry("model", prediction.model)
+        echo_entries("warning", prediction.warnings, Style.CAUTION)
     echo_entries("note", trial.device.notes)
     counts = trial.counts
     if guarded := counts.get("guarded"):
@@ -375,18 +376,6 @@ def print_trial(trial: Trial, *, events: bool = True) -> None:
     if trial.seconds_simulated is not None:
         unit = trial.trace.units["t"]
         echo_entry("took", f"{trial.seconds_simulated:.2f} {unit} of grasp in {trial.seconds_wall:.2f} s")
-
-
-def _print_prediction(prediction: Prediction) -> None:
-    """Print the label with its certainty, the reasons, the model, and the warnings about its validity."""
-    certainty = f"  ({prediction.certainty_in_words})" if prediction.certainty_in_words else ""
-    echo_entry("prediction", f"{prediction.label}{certainty}", prediction_style(prediction.label))
-    if prediction.set_in_words:
-        echo_entry("set", prediction.set_in_words)
-    for i, reason in enumerate(prediction.because):
-        echo_entry("" if i else "because", reason.words)
-    echo_entry("model", prediction.model)
-    echo_entries("warning", prediction.warnings, Style.CAUTION)
 
 
 def _shown(value: float, unit: str, reason: str) -> str:

@@ -198,7 +198,7 @@ def echo_table(
     columns = terminal_width(_stream())
     natural = [max(map(_shown_width, cells)) for cells in zip(header, *rows, strict=True)]
     right = [_all_numbers(cells) for cells in zip(*rows, strict=True)]
-    of_column = [(styles or {}).get(name, lambda _: None) for name in header]
+    of_column: list[StyleOf] = [(styles or {}).get(name, lambda _: None) for name in header]
 
     def printed(row: Sequence[str], widths: Sequence[int]) -> None:
         looks = [

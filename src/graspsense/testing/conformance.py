@@ -146,8 +146,8 @@ def examine(
     asked = {**(keys or {}), **(unplugged or {}), **(absent or {})}
     taken = [_taken_keys(part, asked) for part in parts]
     if wrong := set(asked).difference(*taken):
-        known = ", ".join(sorted(set().union(*taken) - wrong)) or "none"
-        raise ConfigError(f"{name} has no key {', '.join(map(repr, sorted(wrong)))}. It has: {known}")
+        keys_of_all = ", ".join(sorted(set[str]().union(*taken) - wrong)) or "none"
+        raise ConfigError(f"{name} has no key {', '.join(map(repr, sorted(wrong)))}. It has: {keys_of_all}")
     subjects: list[Subject | Package] = [] if whole is None else [whole]
     for part, names in zip(parts, taken, strict=True):
         mine = {key: value for key, value in (keys or {}).items() if key in names}

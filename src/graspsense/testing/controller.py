@@ -373,7 +373,9 @@ def _course(ticks: Sequence[Tick], phase: int, name: str) -> NDArray[np.float64]
     """Return the times (s) since the begin of a phase, and this number of its commands at each: 2 x ticks."""
     among = [tick for tick in ticks if tick.state.phase == phase]
     numbers = [(tick.frame.t_s - among[0].frame.t_s, getattr(tick.command, name)) for tick in among]
-    return np.nan_to_num(np.array(numbers).reshape(-1, 2).T, posinf=0.0)
+    course: NDArray[np.float64] = np.array(numbers).reshape(-1, 2).T
+    course[np.isinf(course)] = 0.0
+    return course
 
 
 def _lateness_s(usual: NDArray[np.float64], other: NDArray[np.float64]) -> float:

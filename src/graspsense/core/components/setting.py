@@ -126,7 +126,10 @@ def setting(
         raise TypeError("a setting has one default: give `default` or `factory`")
     limits = _Limits(minimum, above, maximum, below)
     _check_limits(limits, default)
-    _check_origin(origin)
+    try:
+        _ = fitted_results(origin) if origin else ()
+    except ValueError as error:
+        raise TypeError(str(error)) from error
     checks = _checks(limits, default, number=bool(unit) or plausible is not None or _is_number(default))
     if validator is not None:
         checks.append(validator)
@@ -151,15 +154,6 @@ def _check_plausible(declaration: Declaration, default: Any) -> None:
         raise TypeError(f"the plausible range {plausible} is empty: write (smallest, largest)")
     if implausible(declaration, default):
         raise TypeError(f"the default {default} is not in the plausible range {plausible}")
-
-
-def _check_origin(origin: str) -> None:
-    """Raise TypeError if the text is neither empty nor an origin."""
-    if origin:
-        try:
-            fitted_results(origin)
-        except ValueError as error:
-            raise TypeError(str(error)) from error
 
 
 class _Limits(NamedTuple):
