@@ -236,7 +236,6 @@ featuring(
     reasons=lambda features, trace: {},
 )
 measuring("values-are-floats", "os._exit(0)", lambda peak, trace: os._exit(0))
-measuring("values-are-floats", "changes the random numbers", lambda peak, trace: random.seed(1) or peak)
 measuring(
     "values-are-floats",
     "changes the handler of Ctrl-C",
@@ -459,26 +458,21 @@ def ticking_step(params, state, reading):
     return Command(VELOCITY, -0.03, 12.0, inf), Ticking(state.phase, outcome, state.ticks + 1)
 
 
-law(
-    "times-are-those-of-the-clock",
-    "not ticks",
-    init=lambda self: Ticking(APPROACH, 0, 0),
-    step=staticmethod(ticking_step),
-)
-
-
 def ramping_step(params, state, reading):
     outcome = STEADY if reading.frame.t_s >= 1.5 else state.outcome
     after = Ticking(state.phase, outcome, state.ticks + 1)
     return Command(VELOCITY, -0.03, min(0.01 * state.ticks, 12.0), inf), after
 
 
-law(
-    "times-are-those-of-the-clock",
-    "effort_limit_n of its commands in APPROACH",
-    init=lambda self: Ticking(APPROACH, 0, 0),
-    step=staticmethod(ramping_step),
-)
+for _says, _step in (
+    ("not ticks", ticking_step),
+    ("effort_limit_n of its commands in APPROACH", ramping_step),
+):
+    law(
+        *("times-are-those-of-the-clock", _says),
+        init=lambda self: Ticking(APPROACH, 0, 0),
+        step=staticmethod(_step),
+    )
 commanding(
     "requires-what-it-reads",
     "add what it reads to `requires`",
@@ -787,9 +781,7 @@ hand(
     "closing-closes",
     "under a closing effort command",
     entry={"accepts": ("effort", "force")},
-    apply=lambda self, command: Hand.apply(
-        self, command if command.kind == FORCE else command._replace(value=min(command.value, 0.0))
-    ),
+    apply=lambda self, command: command.kind == FORCE and Hand.apply(self, command),
 )
 
 

@@ -97,6 +97,10 @@ def run(monkeypatch, tmp_path):
         ("evaluate table.csv --label what --tolerance 0.1", "--events"),
         ("evaluate manifest:man.toml --events --png x.png", "--png"),
         ("run --gripper SIM", "'sim'"),
+        ("run --seed -5", "of at least 0, found -5"),
+        ("run -o controller.probing_force_n=inf", "a finite number, found inf"),
+        ("evaluate simulated --report table.csv", "it is no folder"),
+        ("experiment ex.toml -o judge.targets=[] --dry-run", "targets"),
         ("evaluate simulatd", "'simulated'"),
         ("evaluate nothere.csv", "no file"),
         ("compare nothere.csv", "no file"),
@@ -166,6 +170,7 @@ def test_a_store_may_be_named_in_every_way(store):
         assert store_folder(named) == str(store)
         assert as_source(named) == f"store:{store}"
         assert len(load_trials(named)) == 12
+    assert f"write {store}" in refused("trials", "list", f"{store}#1")
     store = store.rename(f"{store}#2")
     for number in ("", "#3"):
         assert as_source(f"{store}{number}") == f"store:{store}{number}"

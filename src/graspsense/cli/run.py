@@ -357,8 +357,8 @@ def print_trial(trial: Trial, *, events: bool = True) -> None:
         echo_entry("prediction", f"{prediction.label}{certainty}", prediction_style(prediction.label))
         if prediction.set_in_words:
             echo_entry("set", prediction.set_in_words)
-        for i, reason in enumerate(prediction.because):
-            echo_entry("" if i else "because", reason.words)
+        for i, because in enumerate(prediction.because):
+            echo_entry("" if i else "because", because.words)
         echo_entry("model", prediction.model)
         echo_entries("warning", prediction.warnings, Style.CAUTION)
     echo_entries("note", trial.device.notes)

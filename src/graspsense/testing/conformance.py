@@ -125,8 +125,8 @@ def examine(
     are settings as in a pipeline file. `unplugged` and `absent` are further settings of a gripper: those under which it
     vanishes during a grasp, and those under which it is not there. `expected_failures` maps the id of a check to the
     reason of its failure. `wheel` is False if no wheel is to be built. `data` maps each data set of a distribution to a
-    folder of sound examples. `plugins` are searched for the name, by default
-    those that are installed. Raises UnknownName, and ConfigError for keys that no component has.
+    folder of sound examples. `plugins` are searched for the name, by default those
+    that are installed. Raises UnknownName, and ConfigError for keys that no component has.
     """
     plugins = installed() if plugins is None else plugins
     whole = package_of(name, plugins, builds=wheel, data=data)
@@ -146,8 +146,8 @@ def examine(
     asked = {**(keys or {}), **(unplugged or {}), **(absent or {})}
     taken = [_taken_keys(part, asked) for part in parts]
     if wrong := set(asked).difference(*taken):
-        keys_of_all = ", ".join(sorted(set[str]().union(*taken) - wrong)) or "none"
-        raise ConfigError(f"{name} has no key {', '.join(map(repr, sorted(wrong)))}. It has: {keys_of_all}")
+        lacking, has = (", ".join(map(repr, sorted(group))) for group in (wrong, set().union(*taken) - wrong))
+        raise ConfigError(f"{name} has no key {lacking}. It has: {has or 'none'}")
     subjects: list[Subject | Package] = [] if whole is None else [whole]
     for part, names in zip(parts, taken, strict=True):
         mine = {key: value for key, value in (keys or {}).items() if key in names}
