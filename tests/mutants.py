@@ -229,12 +229,7 @@ measuring(
     "values-are-floats", "changes sys.stdout", lambda peak, trace: setattr(sys, "stdout", StringIO()) or peak
 )
 measuring("values-fit-their-units", "convert it to its unit", lambda peak, trace: 1000.0 * peak)
-featuring(
-    "values-fit-their-units",
-    "taken for a measured value",
-    values=lambda features, trace: tuple(map(float, np.nan_to_num(features.values))),
-    reasons=lambda features, trace: {},
-)
+featuring("values-fit-their-units", "a measured value", values=(0.0,), reasons={})
 measuring("values-are-floats", "os._exit(0)", lambda peak, trace: os._exit(0))
 measuring(
     "values-are-floats",

@@ -115,9 +115,9 @@ def _leaving_nothing() -> Iterator[None]:
         changed = [name for name, value in _process_state().items() if value != earlier[name]]
     if printed.getvalue():
         lines = [f"{line!r:.60}" for line in printed.getvalue().splitlines() if line.strip()]
-        first = lines[0] if lines else "an empty line"
+        line = lines[0] if lines else "an empty line"
         raise CheckFailed(
-            f"it prints {first}, where the results of a command go: use logging, or print to sys.stderr",
+            f"it prints {line}, where the results of a command go: use logging, or print to sys.stderr",
             "it prints",
         )
     os.chdir(earlier["the working folder"])

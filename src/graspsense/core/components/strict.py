@@ -257,10 +257,10 @@ def _words(error: BaseException) -> str:
     if not error.args or not isinstance(error.args[0], str):
         return f"{type(error).__name__}: {error}"
     if bound := _BOUND.fullmatch(error.args[0]):
-        sign, limit, found = bound.groups()
+        sign, limit, value = bound.groups()
         infinite = {"inf": "finite number", "-inf": "number"}
         wanted = infinite.get(limit, f"number {_BOUNDS[sign]} {limit.removesuffix('.0')}")
-        return f"expected a {wanted}, found {found}"
+        return f"expected a {wanted}, found {value}"
     return error.args[0]
 
 
