@@ -103,7 +103,6 @@ def run(monkeypatch, tmp_path):
         ("import nothere.csv --check", "no file"),
         ("replay csv:nothere.csv", "no file"),
         ("identify nothere.csv --class can --out can.toml", "no file"),
-        ("train nothere.csv --out model.json", "no file"),
     ],
 )
 def test_the_right_words_are_told(run, typed, meant):
