@@ -55,7 +55,7 @@ ASKED: Final = (
     "contact_force_n",
 )
 """The methods by which a law says what it asks of a gripper."""
-LATEST_S: Final = 0.06
+LATEST_S: Final = 0.1
 """The time (s) by which a command may come later on a gripper with another clock."""
 FORCES: Final = slice(5, 9)
 """The forces of a frame, on pads and edges."""
