@@ -12,6 +12,7 @@ import threading
 import time
 from dataclasses import dataclass
 from functools import partial
+from io import StringIO
 from math import inf, isnan, nan
 from typing import Any, NamedTuple
 
@@ -35,6 +36,7 @@ from graspsense.gripper_api import FingerForce, StatusBit
 from graspsense.plugin_api import (
     APPROACH,
     EFFORT,
+    FORCE,
     HOLD,
     POSITION,
     SQUEEZE,
@@ -223,8 +225,12 @@ measuring(
 )
 measuring("same-features-elsewhere", "read no clock", lambda peak, trace: peak + time.localtime().tm_hour)
 measuring("values-are-floats", "use logging", lambda peak, trace: print(peak) or peak)  # noqa: T201
+measuring(
+    "values-are-floats", "changes sys.stdout", lambda peak, trace: setattr(sys, "stdout", StringIO()) or peak
+)
+measuring("values-fit-their-units", "convert it to its unit", lambda peak, trace: 1000.0 * peak)
+featuring("values-fit-their-units", "a measured value", values=(0.0,), reasons={})
 measuring("values-are-floats", "os._exit(0)", lambda peak, trace: os._exit(0))
-measuring("values-are-floats", "changes the random numbers", lambda peak, trace: random.seed(1) or peak)
 measuring(
     "values-are-floats",
     "changes the handler of Ctrl-C",
@@ -430,7 +436,7 @@ leaving(
 )
 leaving(
     "ends-every-grasp",
-    "hold only what was touched",
+    "only what was touched",
     outcome=lambda after, frame: STEADY if frame.t_s > 0.1 else after.outcome,
     phase=lambda after, frame: HOLD if frame.t_s > 0.1 else after.phase,
 )
@@ -447,12 +453,21 @@ def ticking_step(params, state, reading):
     return Command(VELOCITY, -0.03, 12.0, inf), Ticking(state.phase, outcome, state.ticks + 1)
 
 
-law(
-    "times-are-those-of-the-clock",
-    "not ticks",
-    init=lambda self: Ticking(APPROACH, 0, 0),
-    step=staticmethod(ticking_step),
-)
+def ramping_step(params, state, reading):
+    outcome = STEADY if reading.frame.t_s >= 1.5 else state.outcome
+    after = Ticking(state.phase, outcome, state.ticks + 1)
+    return Command(VELOCITY, -0.03, min(0.01 * state.ticks, 12.0), inf), after
+
+
+for _says, _step in (
+    ("not ticks", ticking_step),
+    ("effort_limit_n of its commands in APPROACH", ramping_step),
+):
+    law(
+        *("times-are-those-of-the-clock", _says),
+        init=lambda self: Ticking(APPROACH, 0, 0),
+        step=staticmethod(_step),
+    )
 commanding(
     "requires-what-it-reads",
     "add what it reads to `requires`",
@@ -756,6 +771,12 @@ hand(
     "closing-closes",
     "close the fingers",
     apply=lambda self, command: Hand.apply(self, command._replace(value=-command.value)),
+)
+hand(
+    "closing-closes",
+    "under a closing effort command",
+    entry={"accepts": ("effort", "force")},
+    apply=lambda self, command: command.kind == FORCE and Hand.apply(self, command),
 )
 
 

@@ -56,10 +56,8 @@ def test_settings_reach_the_part_that_is_checked(monkeypatch):
         _, out, _ = graspsense("plugins", "check", "hand", "-o", "here=true")
         assert out.count("not tried") == 2
 
-        code, _, err = graspsense("plugins", "check", "hand", "-o", "hear=true")
-        assert code == 1
-        assert all(part in err for part in ("'hear'", "'here'"))
-
+        told = refused("plugins", "check", "hand", "-o", "hear=true")
+        assert all(part in told for part in ("'hear'", "'here'"))
         assert "-o nonsense: expected KEY=VALUE" in refused("plugins", "check", "hand", "-o", "nonsense")
 
 
@@ -105,12 +103,6 @@ def test_imports_that_moved_are_printed_with_the_new_form_beside(tmp_path):
     assert "Channel ->" not in said
 
 
-def test_a_new_package_says_what_to_do_next(tmp_path):
-    out = printed("plugins", "new", "lab-thing", "--role", "observer", "--folder", str(tmp_path / "thing"))
-    assert f"  pip install -e {tmp_path / 'thing'} pytest\n  graspsense plugins list\n" in out
-    assert "  graspsense plugins check lab-thing\n" in out
-
-
 def test_a_group_without_a_command_prints_its_help_once():
     code, out, err = graspsense("plugins")
 
@@ -122,9 +114,9 @@ def test_a_group_without_a_command_prints_its_help_once():
 @pytest.mark.slow
 def test_a_package_is_made_for_several_roles(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    assert "graspsense run --pipeline lab-hand" in printed(
-        "plugins", "new", "lab-hand", "--role", "controller", "--role", "sensor-backend"
-    )
+    told = printed("plugins", "new", "lab-hand", "--role", "controller", "--role", "sensor-backend")
+    assert "  pip install -e ./lab-hand pytest\n  graspsense plugins list\n" in told
+    assert "graspsense run --pipeline lab-hand" in told
     assert sorted(path.name for path in (tmp_path / "lab-hand/src/lab_hand").glob("*.py")) == [
         "__init__.py",
         "backend.py",

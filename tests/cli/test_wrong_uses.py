@@ -64,7 +64,6 @@ def run(monkeypatch, tmp_path):
         ("predict ~nobody-of-this-name/m.json table.csv", "~nobody-of-this-name/m.json"),
         ("experiment ex.toml -o probing_force_n=17 --dry-run", "'controller.probing_force_n'"),
         ("run -o controller.probing_force_n 17", "-o controller.probing_force_n=17"),
-        ("run -o controller.probing_force_n= 17", "-o controller.probing_force_n=17"),
         ("run -o controller.probing_force_n = 17", "-o controller.probing_force_n=17"),
         ("import a.csv --check -o run.seed 17", "-o run.seed=17"),
         ("run can:empty_open", "--object can:empty_open"),
@@ -89,21 +88,21 @@ def run(monkeypatch, tmp_path):
         ("run -o features.type=grasp-curve", "pip install -e ./examples/grasp_curve"),
         ("evaluate table.csv", "--label COLUMN"),
         ("evaluate table.csv --label what -o features.type=curve", "[classifier]"),
-        ("evaluate table.csv --label what --features ,", "--features ','"),
         ("evaluate simulated --objects ,", "--objects ','"),
         ("run --changed", "--save DIR"),
         ("run --save=", "'--save'"),
-        ("evaluate simulated --gripper=", "'--gripper'"),
         ("evaluate table.csv --label what --tolerance 0.1", "--events"),
         ("evaluate manifest:man.toml --events --png x.png", "--png"),
         ("run --gripper SIM", "'sim'"),
+        ("run --seed -5", "of at least 0, found -5"),
+        ("run -o controller.probing_force_n=inf", "a finite number, found inf"),
+        ("evaluate simulated --report table.csv", "it is no folder"),
+        ("experiment ex.toml -o judge.targets=[] --dry-run", "targets"),
         ("evaluate simulatd", "'simulated'"),
         ("evaluate nothere.csv", "no file"),
-        ("compare nothere.csv", "no file"),
         ("import nothere.csv --check", "no file"),
         ("replay csv:nothere.csv", "no file"),
         ("identify nothere.csv --class can --out can.toml", "no file"),
-        ("train nothere.csv --out model.json", "no file"),
     ],
 )
 def test_the_right_words_are_told(run, typed, meant):
@@ -166,6 +165,7 @@ def test_a_store_may_be_named_in_every_way(store):
         assert store_folder(named) == str(store)
         assert as_source(named) == f"store:{store}"
         assert len(load_trials(named)) == 12
+    assert f"write {store}" in refused("trials", "list", f"{store}#1")
     store = store.rename(f"{store}#2")
     for number in ("", "#3"):
         assert as_source(f"{store}{number}") == f"store:{store}{number}"

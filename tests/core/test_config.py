@@ -263,8 +263,8 @@ seed = true
         ("lab.toml:7: gripper.offsets_n[2]", "expected a number, found true"),
         ("lab.toml:10: gripper.filter.cutof_hz", "Did you mean 'cutoff_hz'? It has: cutoff_hz, order"),
         ("lab.toml:19: controller.forse_n", "Did you mean 'force_n'?"),
-        ("lab.toml:17: controller.force_n", "must be >= 0.0: -1.0"),
-        ("lab.toml:18: controller.speed_m_s", "must be > 0.0: 0.0"),
+        ("lab.toml:17: controller.force_n", "of at least 0, found -1.0"),
+        ("lab.toml:18: controller.speed_m_s", "above 0, found 0.0"),
         ("-o features.type=nosuch", "no feature set named 'nosuch'. Known: catch22, "),
         ("lab.toml:22: run.seed", "expected a whole number, found true"),
     ]

@@ -280,7 +280,7 @@ def test_a_compressed_text_has_the_limits_of_a_text(tmp_path, monkeypatch):
         ([HEADER, *ROWS[:-1], ROWS[-1][:9]], "", 199, "line 201 is cut off"),
         ([HEADER, *ROWS[:-1], ROWS[-1][:-2]], "", 199, "line 201 is cut off"),
         ([HEADER, *ROWS], "", 200, ""),
-        ([HEADER, *ROWS[:50], "# paused", *ROWS[50:]], "\n", 200, r"1 comments \(line 52\)"),
+        ([HEADER, *ROWS[:50], "# paused", *ROWS[50:]], "\n", 200, r"1 comment \(line 52\)"),
     ],
 )
 def test_what_is_left_out_is_told_and_the_recording_is_kept(lines, end, left, note, tmp_path):

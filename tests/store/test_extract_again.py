@@ -67,7 +67,7 @@ def test_the_settings_of_an_experiment_are_used_for_a_store(folder):
     [
         ("gripper.object=can:full", r"\[features\], \[controller\], \[run\] only; its gripper"),
         ("features.contact_force=1", "'contact_force_n'"),
-        ("features.contact_force_n=-1", "must be > 0"),
+        ("features.contact_force_n=-1", "above 0"),
         ("features.type=curv", "curve"),
         ("nonsense", "other keys of"),
     ],

@@ -137,7 +137,13 @@ def _tables(
         features = trials.provenance.get("settings", {}).get("features", {})
         return {str(features.get("type", "given")).rpartition("/")[2]: trials}
     known = [component for component in installed().components("feature-set") if component.qualified != UNION]
-    available = [component for component in known if _available(component, notes)]
+    available = []
+    for component in known:
+        try:
+            component.declared()
+            available.append(component)
+        except PluginUnavailable as error:
+            notes.append(f"features {component.name} are left out: {str(error).splitlines()[0]}")
     # Of equal rates the first candidate is chosen: that with the fewest features.
     available.sort(key=lambda component: (len(component.declared().features), component.qualified))
     try:
@@ -173,16 +179,6 @@ def _tables(
         if len(sets) > 1 and (name == "union" or len(sets) > len(small)):
             tables[name] = _part(united, union, np.concatenate(list(sets.values())), sets=tuple(sets))
     return tables
-
-
-def _available(component: Component, notes: list[str]) -> bool:
-    """Return whether the code of a feature set can be imported; `notes` gets the reason if it cannot."""
-    try:
-        component.declared()
-    except PluginUnavailable as error:
-        notes.append(f"features {component.name} are left out: {str(error).splitlines()[0]}")
-        return False
-    return True
 
 
 def _with_union(

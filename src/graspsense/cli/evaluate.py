@@ -28,7 +28,6 @@ from graspsense.cli.sources import (
 from graspsense.cli.target_value import evaluate_value
 from graspsense.cli.terminal import Style, echo, echo_entries, echo_entry, echo_table, talk
 from graspsense.core.components.strict import plain
-from graspsense.core.settings.selected import SelectedComponent
 from graspsense.core.values.errors import ConfigError
 from graspsense.evaluation.intervals import percent, percentages
 from graspsense.evaluation.json_codec import to_json
@@ -92,6 +91,9 @@ def evaluate(
         return
     refuse_typed(["tolerance"], "is for --events")
     from graspsense.core.learn.checkpoints import checkpoints_of
+    from graspsense.evaluation.checkpoints import early_recognition
+    from graspsense.evaluation.evaluate import evaluate as measure
+    from graspsense.report.evaluation_page import evaluation_page
 
     check_outputs(keep, overwrite=overwrite, sources=[source])
     if given["target_value"]:
@@ -104,11 +106,23 @@ def evaluate(
         labelled = trials_of(source, progress, given, times, folds)
         labelled, parts = _parts(labelled, times, target)
         keep_features(keep, labelled)
-        evaluation, early = _measured(learner, labelled, parts, target, folds, given["seed"], progress)
+        evaluation = measure(
+            learner,
+            labelled,
+            target=target,  # type: ignore[arg-type]
+            folds=folds,
+            seed=given["seed"],
+            settings={key: value for key, value in plain(learner.config).items() if key != "model"},
+            progress=progress,
+        )
+        early = early_recognition(learner, parts, folds=folds, seed=given["seed"]) if parts else None
     if png:
-        _draw(evaluation, Path(png))
+        title = f"{evaluation.source}\n{evaluation.protocol}: {evaluation.headline.words}"
+        confusion_png(evaluation.confusion, title, Path(png))
+        talk(f"drawn in {png}")
     if page is not None:
-        _write_page(page, evaluation, learner, labelled)
+        command = command_line(("report", "png", "keep", "overwrite"))
+        write_html(page, evaluation_page(evaluation, learner, labelled, command))
     more = {} if early is None else {"early": to_json(early)}
     more |= {} if page is None else {"page": str(page)}
     echo_values({**to_json(evaluation), **more})
@@ -117,43 +131,6 @@ def evaluate(
         _print_early(early)
     if page is not None:
         echo_entry("page", str(page))
-
-
-def _measured(
-    learner: SelectedComponent,
-    labelled: Labelled,
-    parts: Sequence[CheckpointTrials],
-    target: str,
-    folds: int,
-    seed: int,
-    progress: ProgressLine,
-) -> tuple[Evaluation, EarlyRecognition | None]:
-    from graspsense.evaluation.checkpoints import early_recognition
-    from graspsense.evaluation.evaluate import evaluate as measure
-
-    evaluation = measure(
-        learner,
-        labelled,
-        target=target,  # type: ignore[arg-type]
-        folds=folds,
-        seed=seed,
-        settings={key: value for key, value in plain(learner.config).items() if key != "model"},
-        progress=progress,
-    )
-    return evaluation, early_recognition(learner, parts, folds=folds, seed=seed) if parts else None
-
-
-def _draw(evaluation: Evaluation, path: Path) -> None:
-    title = f"{evaluation.source}\n{evaluation.protocol}: {evaluation.headline.words}"
-    confusion_png(evaluation.confusion, title, path)
-    talk(f"drawn in {path}")
-
-
-def _write_page(path: Path, evaluation: Evaluation, learner: SelectedComponent, labelled: Labelled) -> None:
-    from graspsense.report.evaluation_page import evaluation_page
-
-    command = command_line(("report", "png", "keep", "overwrite"))
-    write_html(path, evaluation_page(evaluation, learner, labelled, command))
 
 
 def _parts(

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from attrs import asdict
 
 from graspsense.cli.live import Live, LiveOptions, live_options, shown_live
 from graspsense.cli.options import force_option, keys_option
@@ -87,7 +88,7 @@ def experiment(
         return
     from graspsense.experiments.answer import answer
     from graspsense.experiments.executors.choose import chosen
-    from graspsense.experiments.page import findings_of
+    from graspsense.experiments.page import findings_of, write_page
     from graspsense.experiments.results import Results
     from graspsense.experiments.run import refuse_store
     from graspsense.experiments.summary import summarise
@@ -102,13 +103,17 @@ def experiment(
     with shown_live(LiveOptions(live, live_address)) as shown:
         account = _run(planned, results, make, resume, shown)
         summary = summarise(planned, results)
-        page, problem = _written_page(summary, results)
+        page, problem = None, ""
+        try:
+            page = str(write_page(summary, results))
+        except SaveFailed as error:
+            problem = str(error)
         more = findings_of(summary)
         shown.told("progress", {"text": answer(summary) if more is None else more.answer})
     findings: dict[str, Any] = {} if more is None else {"answer": more.answer, "findings": dict(more.values)}
-    findings["page"] = None if page is None else str(page)
+    findings["page"] = page
     echo_values({**summary.as_json(), **findings, **_counts(account, problem)})
-    _print(summary, more, account, f"none: {problem}" if problem else str(page))
+    _print(summary, more, account, page or f"none: {problem}")
     if account.stopped == "interrupted":
         raise click.exceptions.Exit(ExitCode.INTERRUPTED)
     if problem or not account.complete:
@@ -136,16 +141,6 @@ def _run(
             progress=progress,
             said=talk,
         )
-
-
-def _written_page(summary: Summary, results: Results) -> tuple[Path | None, str]:
-    """Write the page and return its path, or None and why it could not be written."""
-    from graspsense.experiments.page import write_page
-
-    try:
-        return write_page(summary, results), ""
-    except SaveFailed as error:
-        return None, str(error)
 
 
 def _counts(account: Account, problem: str) -> dict[str, object]:
@@ -187,14 +182,8 @@ def _list(known: Iterable[str]) -> None:
 
 
 def _effort_as_json(effort: Effort) -> dict[str, object]:
-    return {
-        "cases": effort.cases,
-        "seeds": effort.seeds,
-        "tasks": effort.tasks,
-        "trials": effort.trials,
-        "trainings": effort.trainings,
-        "cpu_seconds": effort.seconds,
-    }
+    values = asdict(effort, filter=lambda field, _: field.name not in ("simulated", "seconds"))
+    return {**values, "tasks": effort.tasks, "cpu_seconds": effort.seconds}
 
 
 def _plan(planned: Planned, results: Results, workers: int) -> None:

@@ -6,6 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -270,6 +271,7 @@ def _import(
     """Import the recordings and print what became of each; those that cannot be replayed join `unreadable`."""
     from graspsense.sources.importing.import_outcomes import refuse_useless, tried
 
+    say = partial(echo, err=values_alone())
     ends = tried(recordings, chosen.settings)
     refuse_useless(recordings, ends.outcomes, chosen.settings(recordings[0]))
     stored = _store(save, recordings, unreadable, chosen)
@@ -278,35 +280,31 @@ def _import(
     if not stored.kept and not unreadable:
         raise ConfigError(stored.refused[0])
     if not stored.kept:
-        echo(f"no new trial for {save}", err=values_alone())
+        say(f"no new trial for {save}")
     elif len(recordings) <= FEW:
         for trial, notes in zip(stored.kept, stored.notes, strict=True):
-            echo(
-                f"{trial['source']}: trial {trial['trial']}, {trial['outcome']}", indent=2, err=values_alone()
-            )
+            say(f"{trial['source']}: trial {trial['trial']}, {trial['outcome']}", indent=2)
             for note in notes:
-                echo(f"  {note}", Style.CAUTION, err=values_alone())
+                say(f"  {note}", Style.CAUTION)
     else:
         outcomes = Counter(trial["outcome"] for trial in stored.kept)
         words = ", ".join(f"{count} {outcome}" for outcome, count in outcomes.items())
-        echo(f"{counted(len(stored.kept), 'trial')} imported into {save}: {words}", err=values_alone())
+        say(f"{counted(len(stored.kept), 'trial')} imported into {save}: {words}")
         for note in recordings[0].labelled.recording.notes[1:]:
-            echo(f"  {note}", err=values_alone())
+            say(f"  {note}")
     if stored.kept:
-        echo(f"  {chosen.words}", err=values_alone())
+        say(f"  {chosen.words}")
         _echo_notices(_summary(recordings), ends.notice, err=values_alone())
     if again := [trial for trial in stored.kept if "earlier" in trial]:
         known = f"{again[0]['source']} is that of trial {again[0]['earlier']}"
-        echo(
+        say(
             f"  {counted(len(again), 'trial')} from sources with a name that the store has, and with another content: "
             f"{known}. A grasp that was read anew is stored twice now: set the earlier trials aside "
             f"(graspsense trials aside {save}#{again[0]['earlier']})",
             Style.CAUTION,
-            err=values_alone(),
         )
     if stored.refused:
-        refused = counted(len(stored.refused), "recording")
-        echo(f"  {refused} left out: {stored.refused[0]}", Style.CAUTION, err=values_alone())
+        say(f"  {counted(len(stored.refused), 'recording')} left out: {stored.refused[0]}", Style.CAUTION)
     echo_values(
         {
             "store": save,

@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from threading import Event
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import click
@@ -123,18 +124,10 @@ def shown_live(asked: LiveOptions, save: str | None = None) -> Iterator[Live]:
         yield shown
         if sys.stderr and sys.stderr.isatty() and (asked.page or asked.foxglove is not None):
             talk("the grasps can still be seen: Ctrl-C ends it")
-            _wait_for_interrupt()
+            with suppress(KeyboardInterrupt):
+                Event().wait()
     finally:
         shown.close()
-
-
-def _wait_for_interrupt() -> None:
-    from threading import Event
-
-    try:
-        Event().wait()
-    except KeyboardInterrupt:
-        talk("")
 
 
 def _start(asked: LiveOptions, feeds: list[LiveFeed]) -> None:
@@ -172,12 +165,10 @@ def _rerun_target(target: str) -> str:
         if os.path.exists(target):
             raise click.UsageError(f"--rerun: {target} already exists: name another file, or move it away")
         return target
-    try:
+    with suppress(ValueError):  # a port that is none
         address = urlsplit(target)
         if address.scheme == "rerun+http" and address.hostname and address.port and address.path == "/proxy":
             return target
-    except ValueError:  # a port that is none
-        pass
     raise click.UsageError(
         f"--rerun is {target!r}: name a file that ends in .rrd, or a viewer as in {RERUN_VIEWER}"
     )

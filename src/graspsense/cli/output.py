@@ -124,7 +124,8 @@ def page_to_write(folder: str) -> Path:
         path.mkdir(parents=True, exist_ok=True)
         _probe(path)
     except OSError as error:
-        raise click.UsageError(f"{folder} cannot be written: {error.strerror}") from error
+        why = "it is no folder" if isinstance(error, FileExistsError) else error.strerror
+        raise click.UsageError(f"{folder} cannot be written: {why}. Name a folder for the page") from error
     return path / "report.html"
 
 

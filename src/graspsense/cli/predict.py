@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import click
@@ -23,14 +23,13 @@ from graspsense.cli.terminal import (
 from graspsense.core.components.entries import ModelEntry
 from graspsense.core.components.registry import installed
 from graspsense.core.values.errors import ConfigError, listed
-from graspsense.core.values.features import UNKNOWN, FeatureTable, Prediction, assumed_units
+from graspsense.core.values.features import UNKNOWN, Prediction, assumed_units
 from graspsense.core.values.label_text import alike_words, natural_order, spelled_alike
 from graspsense.evaluation.intervals import RecognitionRate, rate_of
 from graspsense.evaluation.json_codec import to_json
 
 if TYPE_CHECKING:
     from graspsense.core.learn.labelled import Labelled
-    from graspsense.core.learn.model import Model
 
 MOST_WITH_REASONS: Final = 1000
 """Largest number of trials whose predictions are given with reasons, which take about a millisecond each."""
@@ -63,7 +62,13 @@ def predict(model: str, source: str, **given: Any) -> None:
         raise click.UsageError(f"--target-value: model {model} predicts a label, not a number")
     table, labelled, notes = to_predict(source, asked.names, given)
     labelled = None if labelled is None else labelled.aimed(asked.target)
-    predictions = _predictions(asked, table, {} if labelled is None else labelled.provenance)
+    if mismatch := asked.misfit(table):
+        raise ConfigError(mismatch)
+    provenance = {} if labelled is None else labelled.provenance
+    if len(table) > MOST_WITH_REASONS:
+        predictions = asked.predictions(table, provenance)
+    else:
+        predictions = [asked.predict(table.row(i), provenance=provenance) for i in range(len(table))]
     notes = (*notes, *assumed_units(asked.names, asked.units, table))
     strange = set() if labelled is None else {*labelled.labels} - {*asked.classifier.classes()}
     if strange:
@@ -111,15 +116,6 @@ def _refuse_swapped(model: str, source: str) -> None:
         raise click.UsageError(
             f"{model} is not a model, and {source} is one. The model comes first: graspsense predict {source} {model}"
         )
-
-
-def _predictions(asked: Model, table: FeatureTable, provenance: Mapping[str, Any]) -> list[Prediction]:
-    """Return the prediction of each trial, with reasons unless there are many. Raises ConfigError, DataDamaged."""
-    if mismatch := asked.misfit(table):
-        raise ConfigError(mismatch)
-    if len(table) > MOST_WITH_REASONS:
-        return asked.predictions(table, provenance)
-    return [asked.predict(table.row(i), provenance=provenance) for i in range(len(table))]
 
 
 def _rate(predictions: Sequence[Prediction], labelled: Labelled, learned: str) -> RecognitionRate:

@@ -21,7 +21,7 @@ from graspsense.core.values.trial import trial_as_json
 @click.command()
 @click.argument("recording", metavar="FILE.mcap|DIR#NUMBER|KIND:NAME")
 @pipeline_option("Another pipeline.  [default: the one it was recorded with]", default=None)
-@keys_option("Set a key of the pipeline: -o features.pads=left.")
+@keys_option("Set a key of the pipeline: -o controller.contact_force_n=0.1.")
 @force_option
 @plot_option
 @json_option("Print the trial as JSON.")

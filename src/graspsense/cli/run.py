@@ -44,7 +44,6 @@ if TYPE_CHECKING:
     from graspsense.core.grasp.sinks import Sink
     from graspsense.core.settings.resolved import Settings
     from graspsense.core.values.device import DeviceInfo
-    from graspsense.core.values.features import Prediction
     from graspsense.report.film import Film
     from graspsense.store.record_grasp import Beside
 
@@ -130,7 +129,11 @@ def run(
     if beside is not None:
         _run_beside(settings, beside, save, label)
         return
-    film = _film(picture, video, viewer)
+    film: tuple[Film, ...] = ()
+    if viewer or picture is not None or video is not None:
+        from graspsense.report.film import Film
+
+        film = (Film(picture, video, window=viewer),)
     sinks: tuple[Sink, ...] = film if values_alone() else (LiveRows(), *film)
     with shown_live(live, save) as shown:
         sinks = (*sinks, *shown.sinks)
@@ -158,10 +161,15 @@ def _run_beside(settings: Settings, pipeline: str, save: str | None, label: str 
     """
     from graspsense.core.grasp.pair import run_pair
     from graspsense.store.record_grasp import Beside
+    from graspsense.store.store import Store
 
     other, _ = _settings_to_run(save, label, {"pipeline": pipeline})
     check(other)
-    recordings = _reserved(save)
+    recordings: tuple[Path, ...] = ()
+    if save is not None:
+        with Store.open(save) as store:
+            made_at = datetime.now(UTC).isoformat(timespec="milliseconds")
+            recordings = store.new_recording(made_at), store.new_recording(made_at)
 
     def grasp(member: Member, own: Settings, place: int) -> tuple[Ended, str]:
         if save is None:
@@ -183,17 +191,6 @@ def _run_beside(settings: Settings, pipeline: str, save: str | None, label: str 
             talk(f"kept as trial {kept['trial']} in {save}")
     for trial, interrupted, kept in both:
         finish(trial, interrupted, "" if kept is None else kept["problem"])
-
-
-def _reserved(save: str | None) -> tuple[Path, ...]:
-    """Return the paths of the two recordings of a pair; none where nothing is kept."""
-    from graspsense.store.store import Store
-
-    if save is None:
-        return ()
-    with Store.open(save) as store:
-        made_at = datetime.now(UTC).isoformat(timespec="milliseconds")
-        return store.new_recording(made_at), store.new_recording(made_at)
 
 
 def _as_json(trial: Trial, kept: Mapping[str, Any] | None) -> dict[str, Any]:
@@ -273,15 +270,6 @@ def draw_grasp(trial: Trial, path: Path) -> None:
 
     grasp_png(trial, path)
     talk(f"picture written to {path}")
-
-
-def _film(picture: str | None, video: str | None, viewer: bool) -> tuple[Film, ...]:
-    """Return the sink that receives pictures; nothing if none are asked for."""
-    if picture is None and video is None and not viewer:
-        return ()
-    from graspsense.report.film import Film
-
-    return (Film(picture, video, window=viewer),)
 
 
 def _write_film(films: Sequence[Film], save: str | None, kept: dict[str, Any] | None) -> None:
@@ -364,7 +352,15 @@ def print_trial(trial: Trial, *, events: bool = True) -> None:
         unit = trial.trace.units["t"]
         echo_entry("event", f"{event.what} at {event.t_s:.3f} {unit} ({event.phase.name.lower()})")
     if trial.prediction is not None:
-        _print_prediction(trial.prediction)
+        prediction = trial.prediction
+        certainty = f"  ({prediction.certainty_in_words})" if prediction.certainty_in_words else ""
+        echo_entry("prediction", f"{prediction.label}{certainty}", prediction_style(prediction.label))
+        if prediction.set_in_words:
+            echo_entry("set", prediction.set_in_words)
+        for i, because in enumerate(prediction.because):
+            echo_entry("" if i else "because", because.words)
+        echo_entry("model", prediction.model)
+        echo_entries("warning", prediction.warnings, Style.CAUTION)
     echo_entries("note", trial.device.notes)
     counts = trial.counts
     if guarded := counts.get("guarded"):
@@ -380,18 +376,6 @@ def print_trial(trial: Trial, *, events: bool = True) -> None:
     if trial.seconds_simulated is not None:
         unit = trial.trace.units["t"]
         echo_entry("took", f"{trial.seconds_simulated:.2f} {unit} of grasp in {trial.seconds_wall:.2f} s")
-
-
-def _print_prediction(prediction: Prediction) -> None:
-    """Print the label with its certainty, the reasons, the model, and the warnings about its validity."""
-    certainty = f"  ({prediction.certainty_in_words})" if prediction.certainty_in_words else ""
-    echo_entry("prediction", f"{prediction.label}{certainty}", prediction_style(prediction.label))
-    if prediction.set_in_words:
-        echo_entry("set", prediction.set_in_words)
-    for i, reason in enumerate(prediction.because):
-        echo_entry("" if i else "because", reason.words)
-    echo_entry("model", prediction.model)
-    echo_entries("warning", prediction.warnings, Style.CAUTION)
 
 
 def _shown(value: float, unit: str, reason: str) -> str:

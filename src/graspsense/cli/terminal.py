@@ -198,7 +198,7 @@ def echo_table(
     columns = terminal_width(_stream())
     natural = [max(map(_shown_width, cells)) for cells in zip(header, *rows, strict=True)]
     right = [_all_numbers(cells) for cells in zip(*rows, strict=True)]
-    of_column = [(styles or {}).get(name, _no_style) for name in header]
+    of_column: list[StyleOf] = [(styles or {}).get(name, lambda _: None) for name in header]
 
     def printed(row: Sequence[str], widths: Sequence[int]) -> None:
         looks = [
@@ -323,10 +323,6 @@ def _row_lines(
 def _shown_width(text: str) -> int:
     """Return how many columns of a terminal a text takes: two for a wide character, none for a combining one."""
     return sum(0 if combining(c) else 2 if east_asian_width(c) in "WF" else 1 for c in text)
-
-
-def _no_style(_text: str) -> None:
-    return None
 
 
 class Subcommands(click.Group):

@@ -82,8 +82,9 @@ def instance_held_out(labels: Sequence[str], instances: Sequence[str], k: int, s
 
 def held_out(labels: Sequence[str], instances: Sequence[str] | None, k: int, seed: int) -> Folds:
     """Assign whole instances where they are given, else trials, to at most `k` folds."""
+    k = min(k, len(labels))
     if instances is None:
-        return stratified(labels, min(k, len(labels)), seed)
+        return stratified(labels, k, seed)
     return instance_held_out(labels, instances, k, seed)
 
 

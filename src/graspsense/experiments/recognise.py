@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final, Literal
 
 from attrs import field, frozen
-from attrs.validators import ge, le
+from attrs.validators import ge, le, min_len
 
 from graspsense.core.components.registry import installed
 from graspsense.core.components.strict import structured
@@ -43,7 +43,7 @@ class EvaluationSettings:
     """The keys of `[judge]`."""
 
     folds: int = field(default=10, validator=ge(2))
-    targets: tuple[Literal["both", "class", "state"], ...] = ("both",)
+    targets: tuple[Literal["both", "class", "state"], ...] = field(default=("both",), validator=min_len(1))
     """What is recognised: the label as it is, its class, or the state within each class. See `evaluate`."""
     protocol: Literal["headline", "stratified", "instance_held_out"] = "headline"
     """The folds of the reported rate. `headline` holds out whole instances if instances are named."""

@@ -135,13 +135,16 @@ def words_of(name: str, roles: Sequence[str]) -> dict[str, str]:
     entries = [kind.entry for kind in kinds.values() if kind.entry] + ["PipelineEntry"] * together
     needs = dict.fromkeys(need for kind in kinds.values() for need in kind.needs)
     tests = ["pytest>=8", *(SIMULATOR if together and "sensor-backend" not in kinds else ())]
+    major, minor = map(int, __version__.split(".")[:2])
     words = {
         "name": name,
         "part": part,
         "package": name.replace("-", "_"),
         "term": part.replace("-", "_"),
         "Class": "".join(word.capitalize() for word in part.split("-")),
-        "does": _does(kinds),
+        "does": kinds[roles[0]].does
+        if len(kinds) == 1
+        else f"components for {', '.join(kinds)}, which fit together",
         "api": f"({API[0]}, {API[1]})",
         "kind": kind,
         "import_effort": "    EFFORT,\n" if kind == "effort" else "",
@@ -149,7 +152,7 @@ def words_of(name: str, roles: Sequence[str]) -> dict[str, str]:
         "command": command,
         "needs": "".join(f', "{need}"' for need in needs),
         "tests": ", ".join(f'"{test}"' for test in tests),
-        "core": _compatible(__version__),
+        "core": f"graspsense>={major}.{minor},<{major}.{minor + 1}",
         "imports": _imports([*sorted(entries), "hookimpl"]),
     }
     words["first"] = "\n    ".join(_first(kinds, {**words, "scene": "scene.toml"}))
@@ -181,13 +184,6 @@ def _kinds(roles: Sequence[str]) -> dict[str, ScaffoldKind]:
 def _together(kinds: Mapping[str, ScaffoldKind]) -> bool:
     """Return whether the package ships a pipeline, which it does if a pipeline can select several of its parts."""
     return len(kinds.keys() & TABLE_OF_ROLE) > 1
-
-
-def _does(kinds: Mapping[str, ScaffoldKind]) -> str:
-    """Return what the package is, in words."""
-    if len(kinds) == 1:
-        return next(iter(kinds.values())).does
-    return f"components for {', '.join(kinds)}, which fit together"
 
 
 def _imports(names: Sequence[str]) -> str:
@@ -277,9 +273,3 @@ def _check_importable(name: str) -> None:
             f"the name {name!r} is taken: {others[0]} has a package {package}, which this one would hide. Choose "
             f"another name, as lab-{name}"
         )
-
-
-def _compatible(version: str) -> str:
-    """Return the requirement of a new plugin on graspsense: this major and minor version."""
-    major, minor, *_ = version.split(".")
-    return f"graspsense>={major}.{minor},<{major}.{int(minor) + 1}"

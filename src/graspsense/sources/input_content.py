@@ -366,8 +366,15 @@ def _hash_of_file(path: str) -> str:
 
 @cache
 def _read_hash(path: str, _state: tuple[int, int, int]) -> str:
-    """Return the hash of a file with this size, time of its last change (ns) and number, which is read once."""
+    """Return the hash of a file with this size, time of its last change (ns) and number, which is read once.
+
+    Of a TOML file it is that of its values: comments and blank lines change no result.
+    """
     with Path(path).open("rb") as file:
+        if path.lower().endswith(".toml"):
+            with suppress(tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError):
+                return _hash([repr(tomllib.load(file))])
+            file.seek(0)
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 

@@ -144,7 +144,7 @@ def set_number(store: Store, numbers: Sequence[int], heading: str, cell: str | N
             old = _number_named(current[number], name)
             new = _number_named(recorded[number], name) if cell is None else f"{heading}={cell}"
             if old == new:
-                raise ConfigError(f"trial {number} has {new or f'no {name}'} already")
+                raise ConfigError(f"trial {number} has {new or f'no number {name!r}'} already")
             _keep(connection, number, "value", old, new, why)
 
 

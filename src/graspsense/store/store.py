@@ -31,6 +31,7 @@ from graspsense.store.opening import (
     in_memory,
     is_new,
     make_safe,
+    place_and_number,
     refuse_read_fault,
     sqlite_errors,
     store_folder,
@@ -107,7 +108,9 @@ class Store:
         folder = Path(store_folder(folder))
         path = folder / FILE
         if not path.is_file():
-            raise ConfigError(f"there is no store in {folder}: it has no file {FILE}")
+            place, number = place_and_number(str(folder))
+            whole = f". A single trial is not taken here: write {place}" if number is not None else ""
+            raise ConfigError(f"there is no store in {folder}: it has no file {FILE}{whole}")
         if is_new(folder):
             raise ConfigError(f"the store in {folder} is empty")
         with sqlite_errors(folder):

@@ -6,10 +6,11 @@ import locale
 import os
 import random
 import signal
+import sys
 import threading
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager, redirect_stdout
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from io import StringIO
 from types import ModuleType
 from typing import Any, Final, Literal
@@ -107,16 +108,18 @@ def raises_nothing(what: str, advice: str) -> Iterator[None]:
 @contextmanager
 def _leaving_nothing() -> Iterator[None]:
     """Raise CheckFailed for what the code in this context prints, changes in the process, or leaves running."""
-    printed, threads, earlier = StringIO(), set(threading.enumerate()), _process_state()
-    with redirect_stdout(printed), exits_raise():
+    printed, threads = StringIO(), set(threading.enumerate())
+    with redirect_stdout(printed), redirect_stderr(sys.stderr), exits_raise():
+        earlier = _process_state()
         yield
-    text = printed.getvalue().partition("\n")[0]
+        changed = [name for name, value in _process_state().items() if value != earlier[name]]
     if printed.getvalue():
+        lines = [f"{line!r:.60}" for line in printed.getvalue().splitlines() if line.strip()]
+        line = lines[0] if lines else "an empty line"
         raise CheckFailed(
-            f"it prints {text!r:.60}, where the results of a command go: use logging, or print to sys.stderr",
+            f"it prints {line}, where the results of a command go: use logging, or print to sys.stderr",
             "it prints",
         )
-    changed = [name for name, value in _process_state().items() if value != earlier[name]]
     os.chdir(earlier["the working folder"])
     if "the handler of Ctrl-C" in changed:
         signal.signal(signal.SIGINT, earlier["the handler of Ctrl-C"])
@@ -153,6 +156,8 @@ def leaving_no_thread(doing: str) -> Iterator[None]:
 def _process_state() -> dict[str, Any]:
     return {
         "the working folder": os.getcwd(),
+        "sys.stdout": sys.stdout,
+        "sys.stderr": sys.stderr,
         "the handler of Ctrl-C": signal.getsignal(signal.SIGINT),
         "the locale": locale.setlocale(locale.LC_ALL),
         "np.seterr": np.geterr(),

@@ -11,7 +11,7 @@ from attrs import define, field, frozen
 from graspsense.core.components.entries import ConformanceCheckEntry
 from graspsense.core.components.registry import Component, Plugins, installed
 from graspsense.core.components.strict import keys_of
-from graspsense.core.values.errors import PluginUnavailable, UnknownName
+from graspsense.core.values.errors import ConfigError, PluginUnavailable, UnknownName
 from graspsense.testing import (
     backend,
     classifier,
@@ -125,8 +125,8 @@ def examine(
     are settings as in a pipeline file. `unplugged` and `absent` are further settings of a gripper: those under which it
     vanishes during a grasp, and those under which it is not there. `expected_failures` maps the id of a check to the
     reason of its failure. `wheel` is False if no wheel is to be built. `data` maps each data set of a distribution to a
-    folder of sound examples. `plugins` are searched for the name, by default
-    those that are installed. Raises UnknownName.
+    folder of sound examples. `plugins` are searched for the name, by default those
+    that are installed. Raises UnknownName, and ConfigError for keys that no component has.
     """
     plugins = installed() if plugins is None else plugins
     whole = package_of(name, plugins, builds=wheel, data=data)
@@ -142,19 +142,25 @@ def examine(
     if strangers:
         raise UnknownName(f"there is no check named {', '.join(sorted(strangers))}")
 
-    def under(component: Component) -> Subject:
-        mine = dict(keys or {})
-        if whole is not None:  # each of several components gets the keys that it has
-            try:
-                known = keys_of(component.config_class())
-            except PluginUnavailable:  # the first check reports it
-                known = {}
-            mine = {key: value for key, value in mine.items() if key in known}
-        return Subject(component=component, keys=mine, unplugged=unplugged, absent=absent)
-
+    parts = components if whole is None else whole.components
+    asked = {**(keys or {}), **(unplugged or {}), **(absent or {})}
+    taken = [_taken_keys(part, asked) for part in parts]
+    if wrong := set(asked).difference(*taken):
+        lacking, has = (", ".join(map(repr, sorted(group))) for group in (wrong, set().union(*taken) - wrong))
+        raise ConfigError(f"{name} has no key {lacking}. It has: {has or 'none'}")
     subjects: list[Subject | Package] = [] if whole is None else [whole]
-    subjects += [under(part) for part in (components if whole is None else whole.components)]
+    for part, names in zip(parts, taken, strict=True):
+        mine = {key: value for key, value in (keys or {}).items() if key in names}
+        subjects.append(Subject(component=part, keys=mine, unplugged=unplugged, absent=absent))
     return Examined(tuple(subjects), expected)
+
+
+def _taken_keys(component: Component, asked: Mapping[str, Any]) -> set[str]:
+    """Return the keys of a component; all that are asked for where its class cannot be had, as its first check says."""
+    try:
+        return set(keys_of(component.config_class()))
+    except PluginUnavailable:
+        return set(asked)
 
 
 def parametrize_checks(name: str, **options: Any) -> Any:

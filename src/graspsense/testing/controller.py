@@ -11,6 +11,7 @@ from math import inf, isfinite
 from typing import Any, Final, NamedTuple, get_type_hints
 
 import numpy as np
+from numpy.typing import NDArray
 
 from graspsense.core.compiling.call_graph import NotCompilable, fingerprint
 from graspsense.core.components.channels import can_change, further, no_signals, read_only
@@ -47,15 +48,15 @@ GREATEST: Final = {VELOCITY: 5.0, POSITION: 0.5}
 """The greatest rate of a gap (m/s) and the greatest gap (m) that make sense."""
 LATE_S: Final = 4096.0
 """The time at the first tick of a gripper whose clock has run for an hour."""
-SAME_LENGTH: Final = 0.02
-"""Relative difference in length of two grasps that differ by rounding."""
 ABOUT_AS_LONG: Final = 0.25
-"""The same where the gripper has another rate."""
+"""Relative difference in length of two grasps at different rates."""
 ASKED: Final = (
     *("asked_force_n", "gentlest_force_n", "asked_speed_m_s", "asked_step_m", "asked_interval_s"),
     "contact_force_n",
 )
 """The methods by which a law says what it asks of a gripper."""
+LATEST_S: Final = 0.1
+"""The time (s) by which a command may come later on a gripper with another clock."""
 FORCES: Final = slice(5, 9)
 """The forces of a frame, on pads and edges."""
 
@@ -335,36 +336,55 @@ def requires_what_it_reads(subject: Subject) -> None:
 
 
 def independent_of_the_start_of_the_clock(subject: Subject) -> None:
-    """On a gripper whose clock has run for an hour, a grasp takes as long and ends as on a new one."""
-    _demand_as_long(
-        subject,
-        SAME_LENGTH,
-        "keep the time of the first frame in the state, and use differences of times",
-        first_t_s=LATE_S,
-    )
+    """On a gripper whose clock has run for an hour, a grasp goes on and ends as on a new one."""
+    advice = "keep the time of the first frame in the state, and use differences of times"
+    _demand_same_course(subject, advice, first_t_s=LATE_S)
 
 
 def times_are_those_of_the_clock(subject: Subject) -> None:
-    """On a gripper with half the rate, a grasp takes about as long and ends as at the full rate."""
+    """On a gripper with half the rate, a grasp takes about as long, and is commanded and ends as at the full rate."""
     if any(channel.rate_hz > 0.5 / DT_S for channel in subject.entry.requires):
         raise CheckSkipped("it needs a higher rate")
-    _demand_as_long(
-        subject, ABOUT_AS_LONG, "count seconds by `frame.dt_s` or `frame.t_s`, not ticks", dt_s=2.0 * DT_S
-    )
+    _demand_same_course(subject, "count seconds by `frame.dt_s` or `frame.t_s`, not ticks", dt_s=2.0 * DT_S)
 
 
-def _demand_as_long(subject: Subject, most_change: float, advice: str, **clock: float) -> None:
-    """Raise CheckFailed unless a grasp on a gripper with another clock takes as long and ends as usual."""
-    usual, other = (
-        (ticks[-1].frame.t_s - ticks[0].frame.t_s, Outcome(ticks[-1].after.outcome).words)
-        for ticks in (ticks_of(subject), fresh_ticks(subject, clock=clock))
+def _demand_same_course(subject: Subject, advice: str, **clock: float) -> None:
+    """Raise CheckFailed unless a grasp under another clock takes as long, and is commanded and ends as usual."""
+    grasps = ticks_of(subject), fresh_ticks(subject, clock=clock)
+    (usual_s, usual), (other_s, other) = (
+        (ticks[-1].frame.t_s - ticks[0].frame.t_s, Outcome(ticks[-1].after.outcome).words) for ticks in grasps
     )
     given = ", ".join(f"{name} = {value:g} s" for name, value in clock.items())
     demand(
-        abs(usual[0] - other[0]) <= most_change * usual[0] and usual[1] == other[1],
-        f"a grasp ends as {usual[1]} after {usual[0]:.2f} s, and with {given} as {other[1]} after {other[0]:.2f} s: "
-        f"{advice}",
+        abs(usual_s - other_s) <= ABOUT_AS_LONG * usual_s and usual == other,
+        f"a grasp ends as {usual} after {usual_s:.2f} s, and with {given} as {other} after {other_s:.2f} s: {advice}",
     )
+    for phase in (APPROACH, SQUEEZE, HOLD):
+        for name in Command._fields[1:]:
+            late_s = _lateness_s(*(_course(ticks, phase, name) for ticks in grasps))
+            demand(
+                late_s <= LATEST_S,
+                f"with {given}, {name} of its commands in {Phase(phase).name} comes {late_s:.2g} s too early or late: "
+                f"{advice}",
+            )
+
+
+def _course(ticks: Sequence[Tick], phase: int, name: str) -> NDArray[np.float64]:
+    """Return the times (s) since the begin of a phase, and this number of its commands at each: 2 x ticks."""
+    among = [tick for tick in ticks if tick.state.phase == phase]
+    numbers = [(tick.frame.t_s - among[0].frame.t_s, getattr(tick.command, name)) for tick in among]
+    course: NDArray[np.float64] = np.array(numbers).reshape(-1, 2).T
+    course[np.isinf(course)] = 0.0
+    return course
+
+
+def _lateness_s(usual: NDArray[np.float64], other: NDArray[np.float64]) -> float:
+    """Return by how much time a number comes later: the area between its two courses over the greatest value."""
+    both = usual[:, usual[0] <= other[0].max(initial=-1.0)]
+    if both.shape[1] < 2 or not both[1].any():
+        return 0.0
+    apart = np.abs(both[1] - np.interp(both[0], *other))
+    return float(apart[1:] @ np.diff(both[0]) / np.abs(both[1]).max())
 
 
 def handles_frames_of_nan(subject: Subject) -> None:
@@ -519,8 +539,10 @@ def ends_every_grasp(subject: Subject) -> None:
             f"{grasp.reason}. Let the state's `outcome` leave RUNNING, after {LONGEST_S:g} s at the latest",
         )
         closest_m, width_m = float(grasp.trace.gap_m.min()), OBJECTS[object_name][0]
+        missed = width_m > 0.0 and grasp.outcome == Outcome.NOTHING_THERE
         demand(
-            grasp.outcome != Outcome.STEADY or closest_m < width_m,
-            f"with {object_name} between the fingers, {width_m * 1e3:g} mm wide, the grasp ended as steady, and the "
-            f"fingers came no closer than {closest_m * 1e3:.1f} mm: hold only what was touched",
+            closest_m < width_m or not (missed or grasp.outcome == Outcome.STEADY),
+            f"with {object_name} between the fingers, {width_m * 1e3:g} mm wide, the grasp ended as "
+            f"{grasp.outcome.words}, and the fingers came no closer than {closest_m * 1e3:.1f} mm: close them until "
+            "they touch, and hold only what was touched",
         )

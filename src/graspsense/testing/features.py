@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import inspect
 import time
+from collections.abc import Iterator
 from copy import deepcopy
-from math import nan
+from math import inf, nan
 from typing import Any, Final
 
 import numpy as np
@@ -32,6 +33,8 @@ from graspsense.testing.subject import Subject, elsewhere
 
 CUTS: Final = 48
 LONGEST_S: Final = 2.0
+FAR_BEYOND: Final = 200.0
+"""A factor that a sum over frequencies does not reach, and a unit with the prefix milli exceeds."""
 
 
 def _features(
@@ -131,6 +134,29 @@ def a_whole_grasp_has_features(subject: Subject) -> None:
         f"every feature is missing on a whole grasp: {dict(features.reasons)}. A grasp approaches at 10 mm/s, touches "
         "at 60 mm, is squeezed by 4 mm to 16 N, held and released; each further channel goes from 0 to 16, in any unit",
     )
+
+
+def values_fit_their_units(subject: Subject) -> None:
+    """No feature in m, N or s is far beyond what the grasp has of it; without a tick, only ratios have a value."""
+    trace = _whole(subject)
+    most = {"m": trace.gap_m.max(), "N": trace.force_left_n.max(), "s": trace.t_s[-1]}
+    for name, unit, value in _values(_features(subject, trace)):
+        limit = FAR_BEYOND * most.get(unit, inf)
+        demand(
+            not abs(value) > limit,
+            f"feature {name!r} is {value:g} {unit} in a grasp with gaps to {most['m']:.2g} m and forces to "
+            f"{most['N']:.2g} N, of {most['s']:.2g} s: convert it to its unit, or declare the unit that it has",
+        )
+    for name, unit, value in _values(_features(subject, trace.until(-1.0), "an empty trace")):
+        demand(
+            value != value or unit in ("1", "counts"),
+            f"feature {name!r} is {value:g} {unit} on an empty trace: return NaN with a reason where nothing was "
+            "measured; 0 would be taken for a measured value",
+        )
+
+
+def _values(features: Features) -> Iterator[tuple[str, str, float]]:
+    return zip(features.names, features.units, features.values, strict=True)
 
 
 def width_is_a_gap_of_the_grasp(subject: Subject) -> None:

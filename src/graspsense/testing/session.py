@@ -19,7 +19,7 @@ from graspsense.core.control.guard import GuardParams, GuardState, guard
 from graspsense.core.values.channel import FLOATS
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import GraspsenseError, RecordingEnded
-from graspsense.core.values.signals import Command, Frame, Image, Pads, Reading
+from graspsense.core.values.signals import FORCE, Command, Frame, Image, Pads, Reading
 from graspsense.testing.checks import CheckFailed
 from graspsense.testing.laws import EFFORT_N, closing, kind_of
 
@@ -107,9 +107,9 @@ def readings_of(subject: Any) -> Session:
                 use(session, backend, "recording", RECORDED_FRAMES, None)
             else:
                 kind = kind_of(subject.entry.accepts)
-                use(session, backend, "opening", _ticks(info, OPENING_S), info.opening)
-                use(session, backend, "closing", _ticks(info, CLOSING_S), kind)
-                use(session, backend, "open again", _ticks(info, OPENING_S), info.opening)
+                use(session, backend, "opening", ticks_in(info, OPENING_S), info.opening)
+                use(session, backend, "closing", ticks_in(info, CLOSING_S), kind)
+                use(session, backend, "open again", ticks_in(info, OPENING_S), info.opening)
                 backend.apply(info.relaxed)
     except GraspsenseError as error:
         raise CheckFailed(
@@ -143,7 +143,8 @@ def limits_of(info: DeviceInfo) -> GuardParams:
     )
 
 
-def _ticks(info: DeviceInfo, seconds: float) -> int:
+def ticks_in(info: DeviceInfo, seconds: float) -> int:
+    """Return the number of ticks of this gripper in so many seconds, 20 at least."""
     return max(ceil(seconds * info.rate_hz), 20)
 
 
@@ -176,5 +177,7 @@ def use(
         if isinstance(asked, int):
             earlier = readings[max(len(readings) - 2, 0)].frame
             asked = closing(asked, frame.t_s - readings[0].frame.t_s, earlier.gap_m, frame)
+            if asked.kind == FORCE:
+                asked = asked._replace(value=max(asked.value, backend.least_force_n))
         allowed, watcher = guard(limits, watcher, frame, asked)
         backend.apply(allowed)

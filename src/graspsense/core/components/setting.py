@@ -126,7 +126,10 @@ def setting(
         raise TypeError("a setting has one default: give `default` or `factory`")
     limits = _Limits(minimum, above, maximum, below)
     _check_limits(limits, default)
-    _check_origin(origin)
+    try:
+        _ = fitted_results(origin) if origin else ()
+    except ValueError as error:
+        raise TypeError(str(error)) from error
     checks = _checks(limits, default, number=bool(unit) or plausible is not None or _is_number(default))
     if validator is not None:
         checks.append(validator)
@@ -151,15 +154,6 @@ def _check_plausible(declaration: Declaration, default: Any) -> None:
         raise TypeError(f"the plausible range {plausible} is empty: write (smallest, largest)")
     if implausible(declaration, default):
         raise TypeError(f"the default {default} is not in the plausible range {plausible}")
-
-
-def _check_origin(origin: str) -> None:
-    """Raise TypeError if the text is neither empty nor an origin."""
-    if origin:
-        try:
-            fitted_results(origin)
-        except ValueError as error:
-            raise TypeError(str(error)) from error
 
 
 class _Limits(NamedTuple):
@@ -302,18 +296,12 @@ def _checks(limits: _Limits, default: Any, *, number: bool) -> list[Any]:
     kinds = (validators.ge, validators.gt, validators.le, validators.lt)
     checks += [kind(limit) for kind, limit in zip(kinds, limits, strict=True) if limit is not None]
     if isinstance(default, float) and math.isinf(default):
-        return [*checks, _is_not_nan]
+        return [*checks, validators.ge(-math.inf)]  # which NaN is not
     if number and limits.maximum is None and limits.below is None:
         checks.append(validators.lt(math.inf))
     if number and limits.minimum is None and limits.above is None:
         checks.append(validators.gt(-math.inf))
     return checks
-
-
-def _is_not_nan(instance: Any, attribute: attrs.Attribute[Any], value: Any) -> None:
-    """Raise ValueError for NaN, which no comparison refuses where a number may be infinite."""
-    if value != value:
-        raise ValueError(f"{attribute.name!r} must be a number: {value}")
 
 
 def _is_a_choice(instance: Any, attribute: attrs.Attribute[Any], value: Any) -> None:

@@ -73,6 +73,9 @@ def did_you_mean(path: str, siblings: Sequence[str], elsewhere: Iterable[str]) -
 
 ConfigT = TypeVar("ConfigT")
 
+_BOUND: Final = re.compile(r"'\w+' must be ([<>]=?) (\S+): (.+)")
+_BOUNDS: Final = {">": "above", ">=": "of at least", "<": "below", "<=": "of at most"}
+"""How attrs says that a number is out of its bounds, and its signs in words."""
 _NUMBER_WITH_UNIT: Final = re.compile(r"\s*([-+]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?)\s*[^\d\s]\S*\s*")
 
 
@@ -251,9 +254,14 @@ def _complaints(
 
 def _words(error: BaseException) -> str:
     """Return the text of an error, without the attribute and the value that errors of attrs append."""
-    return (
-        error.args[0] if error.args and isinstance(error.args[0], str) else f"{type(error).__name__}: {error}"
-    )
+    if not error.args or not isinstance(error.args[0], str):
+        return f"{type(error).__name__}: {error}"
+    if bound := _BOUND.fullmatch(error.args[0]):
+        sign, limit, value = bound.groups()
+        infinite = {"inf": "finite number", "-inf": "number"}
+        wanted = infinite.get(limit, f"number {_BOUNDS[sign]} {limit.removesuffix('.0')}")
+        return f"expected a {wanted}, found {value}"
+    return error.args[0]
 
 
 def shown(value: object) -> str:

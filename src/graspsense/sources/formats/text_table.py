@@ -20,7 +20,7 @@ from typing import Any, Final
 
 from attrs import frozen
 
-from graspsense.core.values.errors import DataDamaged, listed
+from graspsense.core.values.errors import DataDamaged, counted, listed
 from graspsense.core.values.limits import CELLS, COLUMNS, LINE_CHARACTERS, TEXT_BYTES
 from graspsense.core.values.written_numbers import (
     NotNumbers,
@@ -179,7 +179,7 @@ class _Layout:
                     f"{self.path}, line {number}: {len(row)} values, but there are {len(names)} columns"
                 )
         if later := [number for number, _ in self.comments if rows and number > rows[0][0]]:
-            self._tell(later, "comments")
+            self._tell(later, "comment")
         return TextTable(
             names=tuple(" ".join(name.split()) for name in names),  # in quotes, one can have several lines
             units=tuple(unit.strip("[]()") for unit in (units or [""] * len(names))[: len(names)]),
@@ -239,7 +239,7 @@ class _Layout:
             if _are_numbers(top):
                 ordinals = [*map(str, range(width))]
                 if numbered := width > 2 and top in (ordinals, ["", *ordinals[:-1]]):
-                    self._tell([self.rows[0][0]], "lines that number the columns")
+                    self._tell([self.rows[0][0]], "line with numbers of the columns")
                 return [f"c{k}" for k in range(1, width + 1)], None, int(numbered), 0
             return top, None, 1, self.rows[0][0]
         return self._later_header(data, width, numeric)
@@ -249,7 +249,7 @@ class _Layout:
         for k in range(1, data or 0):
             kinds = {cell for c, cell in enumerate(self.rows[k][1]) if c in numeric}
             if kinds <= _KINDS and ("continuous" in kinds or ("c" in kinds and self.rows[k + 1 : data])):
-                self._tell([number for number, _ in self.rows[k:data]], "lines on the kinds of columns")
+                self._tell([number for number, _ in self.rows[k:data]], "line on the kinds of columns")
                 del self.rows[k:data]
                 return k
         return data
@@ -307,7 +307,7 @@ class _Layout:
             skipped = [number for number, _ in self.rows[:names]]
             self.notes.append(
                 f"the names of the columns are those of line {self.rows[names][0]}; "
-                + _lines_words(skipped, "lines before them")
+                + _lines_words(skipped, "line before them")
             )
         return self.rows[names][1], units, data if units else names + 1, self.rows[names][0]
 
@@ -394,7 +394,7 @@ class _Layout:
         again = {number for number, row in rows if [cell.casefold() for cell in row] == folded}
         if not again or all(map(is_number, names)):
             return rows
-        self._tell(again, "repeated headers")
+        self._tell(again, "repeated header")
         return [row for row in rows if row[0] not in again and row[1] != units]
 
     def _without_texts(self, rows: list[Row], width: int) -> list[Row]:
@@ -407,7 +407,7 @@ class _Layout:
         texts |= {number for number, _ in behind}
         if not 0 < len(texts) <= max(_FEW_BEFORE, _MOST_BEFORE * len(rows)):
             return rows
-        self._tell(texts, "lines of text")
+        self._tell(texts, "line of text")
         return [row for row in rows if row[0] not in texts]
 
     def _without_blank_end(self, names: list[str], rows: list[Row]) -> tuple[list[str], list[Row]]:
@@ -671,7 +671,8 @@ def distinct_names(names: Sequence[str]) -> list[str]:
 
 def _lines_words(numbers: Sequence[int], what: str) -> str:
     some = ", ".join(map(str, numbers[:4])) + (", ..." if len(numbers) > 4 else "")
-    return f"left out: {len(numbers)} {what} (line {some})"
+    several = what.replace("line ", "lines ", 1) if what.startswith("line ") else f"{what}s"
+    return f"left out: {counted(len(numbers), what, several)} (line {some})"
 
 
 def check_columns(path: Path, names: Sequence[str]) -> None:

@@ -415,7 +415,7 @@ def _note_uninformative_columns(path: Path, table: FeatureTable, notes: list[str
     small = [name for name, values in having if len(values) and 0.0 < _span(values) < SMALL]
     if small:
         notes.append(
-            f"{listed(small)} varies by less than {SMALL:g} in its unit: the classifiers of graspsense answer as they "
+            f"below {SMALL:g} in its unit varies {listed(small)}: the classifiers of graspsense answer as they "
             "do in a smaller unit; Weka's J48 takes values within 1e-05 for equal"
         )
     share = float(np.isnan(table.values).mean())

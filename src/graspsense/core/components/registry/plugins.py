@@ -165,7 +165,8 @@ class Plugins:
                 "again"
             )
         return UnknownName(
-            f"no plugin or component named {name!r}. Known: {', '.join(known)}.{suggestion(name, known)}"
+            f"no plugin or component named {name!r}. Known: {', '.join(known)}.{suggestion(name, known)}\n"
+            "  One of your own is installed first: pip install -e FOLDER"
         )
 
     def absences(self) -> str:
