@@ -68,6 +68,8 @@ _COUNTING: Final = 15
 """Number of values from which on their order shows a counter: of random ones, one column in ten thousand does. Fewer
 number the repetitions with an object."""
 _BY_CHANCE: Final = 0.005
+_IN_BLOCKS_BY_CHANCE: Final = 1e-4
+"""Probability of an order of lines below which it is no chance."""
 _ORDERS: Final = 10_000
 """Number of orders of the lines within the labels from which on a rank correlation is no chance."""
 _IRREGULAR: Final = 0.7
@@ -167,14 +169,23 @@ def identifies(
     if cells < len(values_of):  # a value far from the others hides their grid
         cells = math.inf
     hashed = whole and column.max() >= _HASHED and bool((column % 1000.0).any())
-    if (hashed or cells <= 2.0 * len(values_of)) and name_objects(column.tolist(), known):
+    numbers = column.tolist()
+    if (
+        (hashed or cells <= 2.0 * len(values_of))
+        and name_objects(numbers, known)
+        # Few values are measured equally often by chance.
+        and (are_even([*Counter(numbers).values()]) or are_in_blocks(numbers, known))
+    ):
         return NUMBER_OBJECTS
     named = bool(_NAMES & set(words_of(name)))
     different = len(set(zip(column.tolist(), known, strict=True))) >= (1.0 - _TIES) * len(column)
     for lines in [given] if order is None else [given, np.array(order)[given]]:
-        way, in_labels = one_way(column[np.argsort(lines)]), _follows_in_labels(column, lines, known)
-        # A counter of a byte begins anew.
-        counts = len(values_of) >= _COUNTING and way >= 1.0 - _TIES
+        recorded = np.argsort(lines)
+        way, in_labels = one_way(column[recorded]), _follows_in_labels(column, lines, known)
+        blocks = sum(1 for _ in groupby(known[i] for i in recorded.tolist()))
+        # A counter of a byte begins anew. So does what differs by labels that take turns.
+        turns = 2 * blocks > len(known) and differs_by_label(column, known)
+        counts = len(values_of) >= _COUNTING and way >= 1.0 - _TIES and not turns
         follows = different and (way == 1.0 or in_labels)
         like_clock = _is_regular(values_of) or (is_time(unit) and in_labels)
         if ((whole or named) and (counts or follows)) or (follows and like_clock):
@@ -322,6 +333,17 @@ def _ranks(values: NDArray[np.float64], codes: NDArray[np.int64]) -> NDArray[np.
     return ranks - (np.bincount(codes, weights=ranks) / np.bincount(codes))[codes]
 
 
+def differs_by_label(values: NDArray[np.float64], labels: Sequence[str]) -> bool:
+    """Return whether the values of a label vary by less than half of the variance of all values."""
+    known = np.flatnonzero(~np.isnan(values))
+    codes = np.unique(np.array(labels)[known], return_inverse=True)[1]
+    sizes = np.bincount(codes)
+    if len(sizes) < 2 or int(sizes.min()) < LEAST_LINES or np.ptp(values[known]) == 0.0:
+        return False
+    means = np.bincount(codes, weights=values[known]) / sizes
+    return bool(np.var(values[known] - means[codes]) < 0.5 * np.var(values[known]))
+
+
 def _is_regular(values: NDArray[np.float64], most: float = _IRREGULAR) -> bool:
     """Return whether the steps between these rising values are alike, as those of a clock are."""
     low, middle, high = np.quantile(np.diff(values), (0.25, 0.5, 0.75))
@@ -377,15 +399,34 @@ def groups_of_labels(values: Sequence[Hashable], labels: Sequence[str]) -> list[
     return [group[label] if apart else label for label in labels]
 
 
-def are_even(counts: Sequence[int]) -> bool:
-    """Return whether values have numbers of lines as even as those of objects, by a chi-squared test."""
+def are_even(counts: Sequence[int], by_chance: float = _EVEN) -> bool:
+    """Return whether values have numbers of lines as even as those of objects, by a chi-squared test.
+
+    Or nearly all have as many: two or more is the number of at most a third of the values that are drawn.
+    """
     from scipy.special import gammainc
 
-    mean = sum(counts) / len(counts)
-    uneven = sum((count - mean) ** 2 for count in counts) / mean
-    return mean >= 2.0 and bool(gammainc(0.5 * (len(counts) - 1), 0.5 * uneven) < _EVEN)
+    mean, most = sum(counts) / len(counts), counts.count(max(counts))
+    if max(counts) > 1 and math.comb(len(counts), most) * 3.0 ** (1 - most) < by_chance:
+        return True
+    uneven = (1.0 + sum((count - mean) ** 2 for count in counts)) / mean  # to the middle of the next sum
+    return mean >= 2.0 and bool(gammainc(0.5 * (len(counts) - 1), 0.5 * uneven) < by_chance)
 
 
 def _enough_objects(objects: int, labels: Sequence[str]) -> bool:
     """Return whether there are more objects than a feature has values that tell the labels apart."""
     return objects >= max(LEAST_LINES, 2 * len(set(labels)) + 1)
+
+
+def are_in_blocks(values: Sequence[Hashable], labels: Sequence[str]) -> bool:
+    """Return whether the lines of each value come one after the other, and those of a label do not so by chance.
+
+    All orders of the lines of a label are equally likely.
+    """
+    lines, pairs = Counter(values), Counter(zip(values, labels, strict=True))
+    if len(lines) != sum(1 for _ in groupby(values)):
+        return False
+    orders = sum(math.lgamma(n + 1) for n in Counter(labels).values())
+    in_blocks = sum(math.lgamma(n + 1) for n in Counter(label for _, label in pairs).values())
+    in_blocks += sum(math.lgamma(n + 1) for n in pairs.values())
+    return in_blocks - orders < math.log(_IN_BLOCKS_BY_CHANCE)
