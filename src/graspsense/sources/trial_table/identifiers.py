@@ -165,7 +165,7 @@ def identifies(
         return "are dates or times"
     whole = bool((column == np.floor(column)).all())
     values_of = np.unique(column)
-    cells = cells_in_range(values_of) + 1.0
+    cells: float = round(cells_in_range(values_of)) + 1
     if cells < len(values_of):  # a value far from the others hides their grid
         cells = math.inf
     hashed = whole and column.max() >= _HASHED and bool((column % 1000.0).any())
