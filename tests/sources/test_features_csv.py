@@ -218,7 +218,7 @@ OBJECTS = [f"{k},{what},{k * 0.31 % 1:.3f}" for what in ("can", "jar") for k in 
         ([HEAD, *UNEVEN, "b,0.5,2.25"], "ababababb"),
         # So are those below each group of lines, with lines of one name beside them.
         ([HEAD, *UNEVEN[:4], f"Mean,{BELOW[0]}", "sd,1,1", *UNEVEN[4:], f"Mean,{BELOW[1]}", "sd,1,2"], "abababab"),
-        ([HEAD, *UNEVEN[:4], f"mean,{BELOW[0]}", *UNEVEN[4:], "mean,0.1,0.1"], [*"abab", "mean", *"abab", "mean"]),
+        ([HEAD, *UNEVEN[:4], "mean,0.1,0.2", *UNEVEN[4:], "mean,0.1,0.1"], [*"abab", "mean", *"abab", "mean"]),
         # Zeros that are written with three places are no rounded means, and two numbers can be means by chance.
         ([HEAD, *ZEROS, f"b,{MEANS[0]:.3f},0.000", "a,0.1,0.1"], "ababababba"),
         ([HEAD, *UNEVEN, f"b,{MEANS[0]:.3f},{MEANS[1]:.2f}", "a,0.1,0.1"], "ababababba"),

@@ -108,16 +108,14 @@ def time_column(table: ColumnTable) -> str | None:
 
 def _evenly_rising(table: ColumnTable, rising: Sequence[str]) -> list[str]:
     """Return the columns without a name that rise by nearly equal steps, those with fractions first; no counters."""
-    candidates = []
-    for name in rising:
-        steps = np.diff(table.numbers[name])
-        step = float(np.median(steps))
-        even = bool(np.mean(np.abs(steps - step) <= _EVEN * step) > _MOSTLY) and step != 1.0
-        if even and _UNNAMED(name):
-            candidates.append(name)
-    return sorted(
-        candidates, key=lambda name: bool((table.numbers[name] == np.round(table.numbers[name])).all())
-    )
+    steps = {name: np.diff(table.numbers[name]) for name in rising if _UNNAMED(name)}
+    medians = {name: float(np.median(each)) for name, each in steps.items()}
+    even = [
+        name
+        for name, step in medians.items()
+        if step != 1.0 and np.mean(np.abs(steps[name] - step) <= _EVEN * step) > _MOSTLY
+    ]
+    return sorted(even, key=lambda name: not (table.numbers[name] % 1.0).any())
 
 
 def force_columns(table: ColumnTable, time: str | None) -> tuple[str, ...]:

@@ -149,7 +149,7 @@ def without_missing(columns: GraspColumns) -> GraspColumns:
     If most lack one, all are returned, unless those that have them come at a steady rate, as those of a slower sensor.
     Gap and forces that have rows of their own, as topics that were written to one table, hold their last values.
     """
-    rarest = min(np.count_nonzero(~np.isnan(values)) for values in _needed(columns))
+    rarest = min(np.count_nonzero(~np.isnan(values)) for values in (columns.t_s, *_needed(columns).values()))
     if 2 * int(_known(columns).sum()) < rarest:
         columns = _held(columns)
     known = _known(columns)
@@ -158,12 +158,13 @@ def without_missing(columns: GraspColumns) -> GraspColumns:
     return only(columns, known, f"without a number ({columns.place(int(np.argmin(known)))})")
 
 
-def _needed(columns: GraspColumns) -> tuple[Numbers, ...]:
-    return columns.t_s, columns.gap_m, columns.left_n, columns.right_n
+def _needed(columns: GraspColumns) -> dict[str, Numbers]:
+    return {"gap": columns.gap_m, "left force": columns.left_n, "right force": columns.right_n}
 
 
 def _known(columns: GraspColumns) -> NDArray[np.bool_]:
-    known: NDArray[np.bool_] = np.logical_and.reduce([~np.isnan(values) for values in _needed(columns)])
+    every = (columns.t_s, *_needed(columns).values())
+    known: NDArray[np.bool_] = np.logical_and.reduce([~np.isnan(values) for values in every])
     return known
 
 
@@ -173,10 +174,12 @@ def _held(columns: GraspColumns) -> GraspColumns:
     They are the columns themselves if one has no number, or if its own time goes back.
     """
     order = np.argsort(columns.t_s, kind="stable")
-    in_order = all((np.diff(order[~np.isnan(column[order])]) > 0).all() for column in _needed(columns)[1:])
+    in_order = all(
+        (np.diff(order[~np.isnan(column[order])]) > 0).all() for column in _needed(columns).values()
+    )
     if in_order:  # the rows of one come after those of another
         columns = columns.rows(order)
-    values = {"gap": columns.gap_m, "left force": columns.left_n, "right force": columns.right_n}
+    values = _needed(columns)
     rows = {name: np.flatnonzero(~np.isnan(column)) for name, column in values.items()}
     rises = bool((np.diff(columns.t_s) >= 0.0).all()) and np.ptp(columns.t_s) < LONGEST_S
     if not rises or not all(map(len, rows.values())):
@@ -402,8 +405,7 @@ def _advice_on_times(columns: GraspColumns) -> str:
 
 
 def _check_complete(columns: GraspColumns) -> None:
-    named = {"gap": columns.gap_m, "left force": columns.left_n, "right force": columns.right_n}
-    for what, values in named.items():
+    for what, values in _needed(columns).items():
         missing = np.flatnonzero(~np.isfinite(values))
         if len(missing) == len(values):
             raise DataDamaged(f"{columns.source}: the {what} has no number")

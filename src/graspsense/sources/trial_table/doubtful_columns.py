@@ -22,11 +22,11 @@ from graspsense.sources.columns.column_guess import words_of
 from graspsense.sources.trial_table.identifiers import (
     TIMES,
     are_even,
-    are_in_blocks,
     can_be_days,
     differs_by_label,
     follow_lines,
     groups_of_labels,
+    in_one_block_each,
     is_count,
     is_time,
     name_objects,
@@ -283,17 +283,6 @@ def values_have_one_label(values: Sequence[str] | Sequence[float], labels: Seque
         return False
     ranges = sum(1 for _ in groupby(sorted(given), key=itemgetter(1)))
     return texts or ranges > among or are_even([*different.values()], _EVEN)
-
-
-def in_one_block_each(values: Sequence[str], labels: Sequence[str]) -> bool:
-    """Return whether the lines of each value come one after the other, and tell of the label.
-
-    They are several, or it is no chance that those of a label are so.
-    """
-    lines, pairs = Counter(values), set(zip(values, labels, strict=True))
-    if not 1 < len(lines) == sum(1 for _ in groupby(values)) or len(pairs) == len(lines) * len(set(labels)):
-        return False
-    return min(lines.values()) >= LEAST_LINES or are_in_blocks(values, labels)
 
 
 def passes_without_a_gap(values: Numbers, labels: Sequence[str]) -> bool:

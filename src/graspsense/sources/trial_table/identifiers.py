@@ -174,7 +174,7 @@ def identifies(
         (hashed or cells <= 2.0 * len(values_of))
         and name_objects(numbers, known)
         # Few values are measured equally often by chance.
-        and (are_even([*Counter(numbers).values()]) or are_in_blocks(numbers, known))
+        and (are_even([*Counter(numbers).values()]) or in_one_block_each(numbers, known))
     ):
         return NUMBER_OBJECTS
     named = bool(_NAMES & set(words_of(name)))
@@ -352,13 +352,13 @@ def _is_regular(values: NDArray[np.float64], most: float = _IRREGULAR) -> bool:
 
 def _hardly_repeats(n: int, distinct: int, cells: float) -> bool:
     """Return whether values on a grid repeat too rarely to be measured, if all its cells are as frequent."""
+    from scipy.special import pdtr
+
     ties = n - distinct
     if ties == 0 or math.isinf(cells):
         return bool(np.log1p(-np.arange(n) / max(cells, n)).sum() < math.log(_BY_CHANCE))
-    expected = n - cells * -math.expm1(n * math.log1p(-1.0 / cells))
     # The number of ties is about a Poisson variable.
-    terms = [math.exp(k * math.log(expected) - expected - math.lgamma(k + 1)) for k in range(ties + 1)]
-    return sum(terms) < _BY_CHANCE
+    return bool(pdtr(ties, n - cells * -math.expm1(n * math.log1p(-1.0 / cells))) < _BY_CHANCE)
 
 
 def name_objects(values: Sequence[Hashable], labels: Sequence[str]) -> bool:
@@ -418,15 +418,15 @@ def _enough_objects(objects: int, labels: Sequence[str]) -> bool:
     return objects >= max(LEAST_LINES, 2 * len(set(labels)) + 1)
 
 
-def are_in_blocks(values: Sequence[Hashable], labels: Sequence[str]) -> bool:
-    """Return whether the lines of each value come one after the other, and those of a label do not so by chance.
+def in_one_block_each(values: Sequence[Hashable], labels: Sequence[str]) -> bool:
+    """Return whether the lines of each value come one after the other, and tell of the label.
 
-    All orders of the lines of a label are equally likely.
+    They are several, or it is no chance that those of a label are so, if all orders of its lines are equally likely.
     """
     lines, pairs = Counter(values), Counter(zip(values, labels, strict=True))
-    if len(lines) != sum(1 for _ in groupby(values)):
+    if not 1 < len(lines) == sum(1 for _ in groupby(values)) or len(pairs) == len(lines) * len(set(labels)):
         return False
     orders = sum(math.lgamma(n + 1) for n in Counter(labels).values())
     in_blocks = sum(math.lgamma(n + 1) for n in Counter(label for _, label in pairs).values())
     in_blocks += sum(math.lgamma(n + 1) for n in pairs.values())
-    return in_blocks - orders < math.log(_IN_BLOCKS_BY_CHANCE)
+    return min(lines.values()) >= LEAST_LINES or in_blocks - orders < math.log(_IN_BLOCKS_BY_CHANCE)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Container, Sequence
+from collections.abc import Container, Sequence
 from decimal import Decimal, InvalidOperation
-from itertools import takewhile
+from itertools import chain, groupby, pairwise, takewhile
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -47,11 +47,10 @@ def without_summaries(columns: CsvColumns) -> None:
     In the first and the last lines, each has the name of a statistic that its column has nowhere else; an object of
     that name has several trials. Anywhere, the name stands beside that of other lines, as in `mean (can)`, or in a
     column of numbers, as that of a trial; a column of percentages has 50%. A heading is a text that its column has
-    nowhere else, alone in its line. Means and sums of the lines above are known by their numbers, in any language. A
-    name that is repeated, behind each group of lines, is known by both.
+    nowhere else, alone in its line. Means and sums of the lines above are known by their numbers, in any language; with
+    the name of a statistic also those of each group of lines.
     """
-    chance = _chances(columns)
-    summaries = {i: next(cells[i] for cells in columns.cells.values()) for i in _computed(columns, chance)}
+    summaries = {i: next(cells[i] for cells in columns.cells.values()) for i in _computed(columns)}
     alone = [sum(map(bool, row)) == 1 < len(row) - 1 for row in zip(*columns.cells.values(), strict=True)]
     rows = range(len(columns))
     for name, cells in columns.cells.items():
@@ -65,7 +64,6 @@ def without_summaries(columns: CsvColumns) -> None:
         summaries |= {
             i: cells[i] for i in rows if telling[i] and (i in ends or alone[i] or words[i] not in _STATISTICS)
         }
-        summaries |= {i: cells[i] for i in _behind_groups(words, chance)}
         if not (_STATISTICS.isdisjoint(times) or numbers_with_unit(cells)[1]) and columns.has_numbers(name):
             summaries |= {i: cells[i] for i, word in enumerate(words) if word in _STATISTICS}
     if 0 < len(summaries) < len(columns):
@@ -77,63 +75,42 @@ def without_summaries(columns: CsvColumns) -> None:
         columns.keep([i for i in range(len(columns)) if i not in summaries])
 
 
-def _chances(columns: CsvColumns) -> Callable[[Sequence[int], int], float]:
-    """Return a function of lines and another line: the probability that this is their mean or sum by chance."""
+@np.errstate(over="ignore", invalid="ignore")  # of numbers that no sensor gives
+def _computed(columns: CsvColumns) -> set[int]:
+    """Return the lines that are a mean or the sum of lines above them, as no trial is by chance, and those beside them.
+
+    They are the last lines, or have the names of statistics behind each group of lines.
+    """
     read = {name: columns.numbers_or_none(name) for name in columns.names}
     finite = [name for name, values in read.items() if values is not None and not np.isinf(values).any()]
-    finite = finite[:_ENOUGH_COLUMNS]
-    numbers = np.array([read[name] for name in finite]).reshape(len(finite), len(columns)).T
+    finite, n = finite[:_ENOUGH_COLUMNS], len(columns)
+    numbers = np.array([read[name] for name in finite]).T
+    texts = [columns.cells[name] for name, values in read.items() if values is None]
 
-    def chance(lines: Sequence[int], i: int) -> float:
+    def is_of(lines: Sequence[int], i: int, *, named: bool) -> bool:
         places = [
             _places(columns.cells[name][i], number) for name, number in zip(finite, numbers[i], strict=True)
         ]
-        return _chance_of_mean_or_sum(numbers[lines], numbers[i], np.array(places, dtype=np.float64))
+        chance = _chance_of_mean_or_sum(numbers[lines], numbers[i], np.array(places, dtype=np.float64))
+        return chance < (_BY_CHANCE if named else _BY_CHANCE / _COMPARED)
 
-    return chance
-
-
-def _computed(columns: CsvColumns, chance: Callable[[Sequence[int], int], float]) -> range:
-    """Return the last lines where a mean or the sum of the lines above them begins, as no trial has by chance."""
-    texts = [columns.cells[name] for name in columns.names if columns.numbers_or_none(name) is None]
-    n = len(columns)
-
-    def is_of(lines: Sequence[int], i: int) -> bool:
+    def is_computed(i: int, begin: int) -> bool:
+        alike = ([k for k in range(i) if cells[k] == cells[i]] for cells in texts if begin == i)
         named = any(cells[i] not in cells[:i] for cells in texts)
-        most = _BY_CHANCE if named else _BY_CHANCE / _COMPARED
-        return len(lines) >= LEAST_LINES and chance(lines, i) < most
+        return any(
+            len(lines) >= LEAST_LINES and is_of(lines, i, named=named) for lines in (range(begin), *alike)
+        )
 
-    def is_computed(i: int) -> bool:
-        alike = ([k for k in range(i) if cells[k] == cells[i]] for cells in texts)
-        return any(is_of(lines, i) for lines in (range(i), *alike))
-
-    able = range(n - 1, max(n // 2, n - _MOST_LAST) - 1, -1)
-    begins = (k for k in able if any(is_of(range(k), i) for i in range(k, n)))
-    begin = next(begins, n)
-    while begin - 1 in able and is_computed(begin - 1):
+    able = range(n - 1, max(n // 2, n - _MOST_LAST) - 1, -1) if finite else range(0)
+    begin = next((k for k in able if any(is_computed(i, k) for i in range(k, n))), n)
+    while begin - 1 in able and is_computed(begin - 1, begin - 1):
         begin -= 1
-    return range(begin, n)
-
-
-def _behind_groups(words: Sequence[str], chance: Callable[[Sequence[int], int], float]) -> list[int]:
-    """Return the lines of statistics that are behind each group of lines, if one is the mean or the sum of each."""
-    lines: dict[str, list[int]] = {}
-    groups: list[list[int]] = [[]]
-    for i, word in enumerate(words):
-        if word in _STATISTICS:
-            lines.setdefault(word, []).append(i)
-            groups += [[]] if groups[-1] else []
-        else:
-            groups[-1].append(i)
-    able = [group for group in groups if group]
-
-    def are_of_groups(behind: Sequence[int]) -> bool:
-        chances = [*map(chance, able, behind)]
-        return len(behind) == len(able) > 1 and max(chances) < 1.0 and math.prod(chances) < _BY_CHANCE
-
-    if any(map(are_of_groups, lines.values())):
-        return [i for behind in lines.values() if len(behind) == len(able) for i in behind]
-    return []
+    statistics = [any(_word(cells[i]) in _STATISTICS for cells in texts) for i in range(n if finite else 0)]
+    runs = pairwise([*run] for _, run in groupby(range(len(statistics)), statistics.__getitem__))
+    behind = (
+        run for lines, run in runs if statistics[run[0]] and any(is_of(lines, i, named=True) for i in run)
+    )
+    return {*range(begin, n), *chain(*behind)}
 
 
 def _places(cell: str, number: float) -> int:
@@ -145,7 +122,6 @@ def _places(cell: str, number: float) -> int:
     return max(0, -int(written.as_tuple().exponent)) if written.is_finite() else 0
 
 
-@np.errstate(over="ignore", invalid="ignore")  # of numbers that no sensor gives
 def _chance_of_mean_or_sum(lines: Numbers, line: Numbers, places: Numbers) -> float:
     """Return the probability that drawn numbers are the means, or the sums, of several lines; 1 if these are not.
 
