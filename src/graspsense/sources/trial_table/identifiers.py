@@ -68,10 +68,8 @@ _COUNTING: Final = 15
 """Number of values from which on their order shows a counter: of random ones, one column in ten thousand does. Fewer
 number the repetitions with an object."""
 _BY_CHANCE: Final = 0.005
-_IN_BLOCKS_BY_CHANCE: Final = 1e-4
-"""Probability of an order of lines below which it is no chance."""
 _ORDERS: Final = 10_000
-"""Number of orders of the lines within the labels from which on a rank correlation is no chance."""
+"""Number of orders of the lines within the labels, for each of its kind, from which on an order is no chance."""
 _IRREGULAR: Final = 0.7
 """Quartile range of the steps of a clock over their median; of sorted measurements it is 1.6 or more on average."""
 _SPACED: Final = 30
@@ -82,6 +80,8 @@ _ENDS: Final = 2
 """Objects that may have fewer lines than the others: the first and the last one; or the last one of each label."""
 _EVEN: Final = 1e-3
 """Probability that drawn values have numbers of lines as even as those of objects."""
+_TWO: Final = 1.9
+"""Mean number of lines of objects that have two each, but for those at the ends."""
 _HASHED: Final = 1e7
 """Integers from this one on are hashes, if they number objects and are no multiples of 1000."""
 _EPOCH_S: Final = (6.3e8, 4.2e9)
@@ -400,17 +400,12 @@ def groups_of_labels(values: Sequence[Hashable], labels: Sequence[str]) -> list[
 
 
 def are_even(counts: Sequence[int], by_chance: float = _EVEN) -> bool:
-    """Return whether values have numbers of lines as even as those of objects, by a chi-squared test.
-
-    Or nearly all have as many: two or more is the number of at most a third of the values that are drawn.
-    """
+    """Return whether values have numbers of lines as even as those of objects, by a chi-squared test."""
     from scipy.special import gammainc
 
-    mean, most = sum(counts) / len(counts), counts.count(max(counts))
-    if max(counts) > 1 and math.comb(len(counts), most) * 3.0 ** (1 - most) < by_chance:
-        return True
+    mean = sum(counts) / len(counts)
     uneven = (1.0 + sum((count - mean) ** 2 for count in counts)) / mean  # to the middle of the next sum
-    return mean >= 2.0 and bool(gammainc(0.5 * (len(counts) - 1), 0.5 * uneven) < by_chance)
+    return mean > _TWO and bool(gammainc(0.5 * (len(counts) - 1), 0.5 * uneven) < by_chance)
 
 
 def _enough_objects(objects: int, labels: Sequence[str]) -> bool:
@@ -429,4 +424,4 @@ def in_one_block_each(values: Sequence[Hashable], labels: Sequence[str]) -> bool
     orders = sum(math.lgamma(n + 1) for n in Counter(labels).values())
     in_blocks = sum(math.lgamma(n + 1) for n in Counter(label for _, label in pairs).values())
     in_blocks += sum(math.lgamma(n + 1) for n in pairs.values())
-    return min(lines.values()) >= LEAST_LINES or in_blocks - orders < math.log(_IN_BLOCKS_BY_CHANCE)
+    return min(lines.values()) >= LEAST_LINES or orders - in_blocks > math.log(_ORDERS)
