@@ -169,13 +169,10 @@ def identifies(
     if cells < len(values_of):  # a value far from the others hides their grid
         cells = math.inf
     hashed = whole and column.max() >= _HASHED and bool((column % 1000.0).any())
-    numbers = column.tolist()
-    if (
-        (hashed or cells <= 2.0 * len(values_of))
-        and name_objects(numbers, known)
-        # Few values are measured equally often by chance.
-        and (are_even([*Counter(numbers).values()]) or in_one_block_each(numbers, known))
-    ):
+    numbers, on_grid = column.tolist(), hashed or cells <= 2.0 * len(values_of)
+    # Few values are measured equally often by chance.
+    no_chance = are_even([*Counter(numbers).values()]) or in_one_block_each(numbers, known)
+    if on_grid and no_chance and name_objects(numbers, known):
         return NUMBER_OBJECTS
     named = bool(_NAMES & set(words_of(name)))
     different = len(set(zip(column.tolist(), known, strict=True))) >= (1.0 - _TIES) * len(column)
