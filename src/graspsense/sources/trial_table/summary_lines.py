@@ -79,7 +79,7 @@ def without_summaries(columns: CsvColumns) -> None:
 def _computed(columns: CsvColumns) -> set[int]:
     """Return the lines that are a mean or the sum of lines above them, as no trial is by chance, and those beside them.
 
-    They are the last lines, or have the names of statistics behind each group of lines.
+    They are the last lines, or have the names of statistics behind most groups of lines.
     """
     read = {name: columns.numbers_or_none(name) for name in columns.names}
     finite = [name for name, values in read.items() if values is not None and not np.isinf(values).any()]
@@ -107,10 +107,9 @@ def _computed(columns: CsvColumns) -> set[int]:
         begin -= 1
     statistics = [any(_word(cells[i]) in _STATISTICS for cells in texts) for i in range(n if finite else 0)]
     runs = pairwise([*run] for _, run in groupby(range(len(statistics)), statistics.__getitem__))
-    behind = (
-        run for lines, run in runs if statistics[run[0]] and any(is_of(lines, i, named=True) for i in run)
-    )
-    return {*range(begin, n), *chain(*behind)}
+    behind = [(lines, run) for lines, run in runs if statistics[run[0]]]
+    known = sum(any(is_of(lines, i, named=True) for i in run) for lines, run in behind)
+    return {*range(begin, n), *chain(*(run for _, run in behind if 2 * known > len(behind)))}
 
 
 def _places(cell: str, number: float) -> int:
