@@ -37,13 +37,3 @@ def test_a_column_that_differs_by_rounding_alone_is_no_feature(tmp_path):
     lines = [f"{'ab'[k % 2]},{1.0 + 2.0**-52 * (k * 7 % 5)!r},{k * 7 % 11}" for k in range(40)]
     path.write_text("\n".join(["what,k [m],force", *lines]))
     assert read_labelled(path, "what").table.names == ("force",)
-
-
-def test_a_table_whose_columns_vary_by_little_is_read_without_a_note(tmp_path):
-    trials, path = measured(1e-6), tmp_path / "t.csv"
-    lines = [
-        f"{label},{value!r},{7 * k % 5}"
-        for k, (label, (value,)) in enumerate(zip(trials.labels, trials.table.values.tolist(), strict=True))
-    ]
-    path.write_text("\n".join(["what,compliance [m/N],force", *lines]))
-    assert not [note for note in read_labelled(path, "what").notes if "compliance" in note]
