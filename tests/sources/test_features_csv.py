@@ -198,6 +198,8 @@ STATISTICS = ["mean", "Total", "Average:", "std", "median", "Summe", "Std. Dev."
 UNEVEN = [f"{'ab'[k % 2]},{k * 0.137 % 1:.3f},{k * k * 0.313 % 7:.3f}" for k in range(8)]
 ZEROS = [re.sub("[^,]*$", ("0.000", "0.812")[k % 4 == 0], line) for k, line in enumerate(UNEVEN)]
 MEANS = [sum(float(line.split(",")[k]) for line in UNEVEN) / 8 for k in (1, 2)]
+BELOW = [",".join(f"{sum(float(line.split(',')[k]) for line in part) / 4:.4f}" for k in (1, 2))
+         for part in (UNEVEN[:4], UNEVEN[4:])]  # fmt: skip
 OBJECTS = [f"{k},{what},{k * 0.31 % 1:.3f}" for what in ("can", "jar") for k in range(6)]
 
 
@@ -214,6 +216,9 @@ OBJECTS = [f"{k},{what},{k * 0.31 % 1:.3f}" for what in ("can", "jar") for k in 
         *(([HEAD, *UNEVEN, f"{word},{times * MEANS[0]:.5f},{times * MEANS[1]:.4f}", "b,0.1,0.1"], "abababab")
           for word in ("a", "", "\u5e73\u5747") for times in (1, 8)),
         ([HEAD, *UNEVEN, "b,0.5,2.25"], "ababababb"),
+        # So are those below each group of lines, with lines of one name beside them.
+        ([HEAD, *UNEVEN[:4], f"Mean,{BELOW[0]}", "sd,1,1", *UNEVEN[4:], f"Mean,{BELOW[1]}", "sd,1,2"], "abababab"),
+        ([HEAD, *UNEVEN[:4], "mean,0.1,0.2", *UNEVEN[4:], "mean,0.1,0.1"], [*"abab", "mean", *"abab", "mean"]),
         # Zeros that are written with three places are no rounded means, and two numbers can be means by chance.
         ([HEAD, *ZEROS, f"b,{MEANS[0]:.3f},0.000", "a,0.1,0.1"], "ababababba"),
         ([HEAD, *UNEVEN, f"b,{MEANS[0]:.3f},{MEANS[1]:.2f}", "a,0.1,0.1"], "ababababba"),
@@ -333,5 +338,6 @@ def test_labels_that_differ_in_spelling_only_are_noted(csv, other):
 
     assert len(spelling(other, "tin can 1")) == 1
     assert spelling("c\u0430n", "can")[0].endswith("'can' and 'c\\u0430n'")
+    assert spelling("C", "can")
     assert not spelling("can\ufe0f", "can")
     assert not spelling("tin can 1", "tin can 1")

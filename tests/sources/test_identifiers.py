@@ -61,6 +61,8 @@ def test_where_the_lines_are_shuffled_numbers_are_known_by_their_name_their_orde
     assert not identifies("force", "", values, labels)
     # A clock follows the order of recording.
     assert identifies("x", "", np.array(COUNTERS["a clock in seconds"])[order], labels, order.tolist())
+    # Tenths that do not repeat, in few lines.
+    assert identifies("x", "", (order[order < 20] / 10).tolist(), LABELS[20:40])
     # Numbers of objects are instances.
     objects = np.repeat(np.arange(12), 5)
     assert "--instance" in identifies("x", "", objects, LABELS)
@@ -69,6 +71,11 @@ def test_where_the_lines_are_shuffled_numbers_are_known_by_their_name_their_orde
     kinds = [f"kind {k // 20}" for k in range(N)]
     fewer = [10 * (k // 20) + k % 20 // 3 for k in range(N)]
     assert "--instance" in identifies("x", "", np.array(fewer)[order], [kinds[k] for k in order])
+    # Few values of few lines can be measured equally often, and sizes that take turns rise with each turn.
+    assert not identifies("x", "", [2, 0, 2, 1, 0, 2, 4, 5, 4, 5, 4, 5], ["can"] * 6 + ["jar"] * 6)
+    assert not identifies(
+        "x", "", [30 * (k % 6) + k * 7 % 5 + k // 24 for k in range(48)], [f"{k % 6}" for k in range(48)]
+    )
 
 
 def table(path, column, values, measured=True):

@@ -37,17 +37,3 @@ def test_a_column_that_differs_by_rounding_alone_is_no_feature(tmp_path):
     lines = [f"{'ab'[k % 2]},{1.0 + 2.0**-52 * (k * 7 % 5)!r},{k * 7 % 11}" for k in range(40)]
     path.write_text("\n".join(["what,k [m],force", *lines]))
     assert read_labelled(path, "what").table.names == ("force",)
-
-
-def test_a_table_whose_columns_vary_by_little_is_read_with_a_note(tmp_path):
-    path = tmp_path / "t.csv"
-    lines = [f"{label},{value!r},{7 * k % 5}" for k, (label, value) in enumerate(small_values())]
-    path.write_text("\n".join(["what,compliance [m/N],force", *lines]))
-    (note,) = [note for note in read_labelled(path, "what").notes if "compliance" in note]
-    assert "0.001" in note
-    assert "1e-05" in note
-
-
-def small_values():
-    trials = measured(1e-6)
-    return zip(trials.labels, trials.table.values[:, 0].tolist(), strict=True)

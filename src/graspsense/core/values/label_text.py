@@ -70,11 +70,14 @@ def label_text(text: str) -> str:
 def spelled_alike(texts: Iterable[str]) -> list[tuple[str, str]]:
     """Return pairs of different labels or names that differ in case, accents, spaces, hyphens, quotes, width or leading
     zeros only, in the last zeros or the comma of a decimal number, or in letters of two alphabets that look the same.
+    So is a letter alike with the only word that it begins.
 
     >>> spelled_alike(["tin-can", "tin\u2010can"])
     [('tin-can', 'tin‐can')]
     >>> spelled_alike(["can1", "Can 01", "can2", "-2", "2", "1-2", "12", "0.5", "0,50", "1.20.30", "'full'", "full."])
     [('0,50', '0.5'), ('Can 01', 'can1'), ("'full'", 'full.')]
+    >>> spelled_alike(["yes", "no", "Y"]), spelled_alike(["a", "ab", "can", "cup", "c"])
+    ([('Y', 'yes')], [])
     """
     by_form: dict[str, str] = {}
     pairs = []
@@ -86,6 +89,9 @@ def spelled_alike(texts: Iterable[str]) -> list[tuple[str, str]]:
         other = by_form.setdefault(form, text)
         if other != text:
             pairs.append((other, text))
+    for letter in filter(str.isalpha, by_form):
+        words = [word for word in by_form if word[:1] == letter and len(word) > 2 and word.isalpha()]
+        pairs += [(by_form[letter], by_form[word]) for word in words if len(letter) == len(words)]
     return pairs
 
 

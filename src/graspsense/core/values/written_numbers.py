@@ -241,11 +241,10 @@ def _common(cells: Sequence[str]) -> int | NotNumbers:
         if not fits:
             return NotNumbers(row, cell, "which is not a number; a missing one is an empty cell")
         common &= fits
-    bracketed = [cell.startswith("(") for cell in cells if not is_missing(cell)]
-    if bracketed and all(bracketed):
-        return NotNumbers(
-            0, cells[0], "and all cells have parentheses or a minus sign last: write the minus sign first"
-        )
+    given = [row for row, cell in enumerate(cells) if not is_missing(cell)]
+    if given and all(cells[row].startswith("(") for row in given):
+        why = "and all cells have parentheses or a minus sign last: write the minus sign first"
+        return NotNumbers(given[0], cells[given[0]], why)
     return common or _mixed(cells)
 
 

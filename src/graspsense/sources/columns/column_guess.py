@@ -108,16 +108,14 @@ def time_column(table: ColumnTable) -> str | None:
 
 def _evenly_rising(table: ColumnTable, rising: Sequence[str]) -> list[str]:
     """Return the columns without a name that rise by nearly equal steps, those with fractions first; no counters."""
-    candidates = []
-    for name in rising:
-        steps = np.diff(table.numbers[name])
-        step = float(np.median(steps))
-        even = bool(np.mean(np.abs(steps - step) <= _EVEN * step) > _MOSTLY) and step != 1.0
-        if even and _UNNAMED(name):
-            candidates.append(name)
-    return sorted(
-        candidates, key=lambda name: bool((table.numbers[name] == np.round(table.numbers[name])).all())
-    )
+    steps = {name: np.diff(table.numbers[name]) for name in rising if _UNNAMED(name)}
+    medians = {name: float(np.median(each)) for name, each in steps.items()}
+    even = [
+        name
+        for name, step in medians.items()
+        if step != 1.0 and np.mean(np.abs(steps[name] - step) <= _EVEN * step) > _MOSTLY
+    ]
+    return sorted(even, key=lambda name: not (table.numbers[name] % 1.0).any())
 
 
 def force_columns(table: ColumnTable, time: str | None) -> tuple[str, ...]:
@@ -141,17 +139,18 @@ def _unnamed_forces(table: ColumnTable, columns: Sequence[str]) -> list[str]:
         for name in columns
         if not (GAP_WORDS | EFFORT_WORDS) & set(words_of(name)) and not _UNNAMED(name)
     ]
-    groups = [group for group in _numbered_groups(others) if _are_cells(table, group)]
+    groups = [own for own in _numbered_groups(others) if _cells(table, own).shape[1] >= _FEWEST_CELLS]
     return [name for group in groups if _rises_late(table, group) for name in group]
 
 
-def _are_cells(table: ColumnTable, group: Sequence[str]) -> bool:
-    return sum(table.numbers[name].reshape(len(table), -1).shape[1] for name in group) >= _FEWEST_CELLS
+def _cells(table: ColumnTable, names: Sequence[str]) -> Numbers:
+    """Return the numbers of several columns and arrays beside each other, a row for each sample."""
+    return np.column_stack([table.numbers[name].reshape(len(table), -1) for name in names])
 
 
 def _rises_late(table: ColumnTable, names: Sequence[str]) -> bool:
     """Return whether numbers stay for most of the time in which they make half of their way, as a force does."""
-    values = np.column_stack([table.numbers[name] for name in names])
+    values = _cells(table, names)
     values = values[np.isfinite(values).all(axis=1)]
     if len(values) < _UNLOADED:
         return False
@@ -201,11 +200,9 @@ def _gap_columns(table: ColumnTable, taken: Sequence[str | None]) -> tuple[str, 
 def _time(table: ColumnTable, name: str) -> Guess:
     values = table.numbers[name]
     stated = _stated(table, name, "time")
-    if stated:
-        return Guess(key="time", value=f"{quoted(name)} [{stated}]")
+    if stated or unit_since_1970(float(values[0])):  # which the reader tells
+        return Guess(key="time", value=f"{quoted(name)} [{stated}]" if stated else quoted(name))
     step = float(np.median(np.diff(values)))
-    if unit_since_1970(float(values[0])):  # which the reader tells
-        return Guess(key="time", value=quoted(name))
     to_s = TO_SI["time"]
     unit = next((unit for unit in ("s", "ms", "us", "ns") if step * to_s[unit] <= _LONGEST_STEP_S), "s")
     rate_hz = 1.0 / (step * to_s[unit]) if step > 0.0 else math.nan
@@ -295,7 +292,7 @@ def _force(table: ColumnTable, key: str, groups: Sequence[Sequence[str]], said: 
     """Return the force of single columns, or of groups of cells."""
     names = [name for group in groups for name in group]
     unit, checks = _stated(table, names[0], "force"), [said] if said else []
-    values = np.concatenate([table.numbers[name].reshape(-1) for name in names])
+    values = _cells(table, names)
     if not unit:
         whole = bool((values[np.isfinite(values)] == np.round(values[np.isfinite(values)])).all())
         unit = "counts" if whole and float(np.nanmax(np.abs(values))) > _COUNTS else "N"
@@ -310,11 +307,8 @@ def _force(table: ColumnTable, key: str, groups: Sequence[Sequence[str]], said: 
 
 
 def _mean(table: ColumnTable, names: Sequence[str]) -> Numbers | None:
-    parts = [table.numbers[name].reshape(len(table), -1) for name in names]
-    if not parts:
-        return None
-    mean: Numbers = np.column_stack(parts).mean(axis=1)
-    return mean if np.isfinite(mean).any() else None
+    mean: Numbers | None = _cells(table, names).mean(axis=1) if names else None
+    return mean if mean is not None and np.isfinite(mean).any() else None
 
 
 def _stated(table: ColumnTable, name: str, quantity: str) -> str:

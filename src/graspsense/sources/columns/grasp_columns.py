@@ -149,7 +149,7 @@ def without_missing(columns: GraspColumns) -> GraspColumns:
     If most lack one, all are returned, unless those that have them come at a steady rate, as those of a slower sensor.
     Gap and forces that have rows of their own, as topics that were written to one table, hold their last values.
     """
-    rarest = min(np.count_nonzero(~np.isnan(values)) for values in _needed(columns))
+    rarest = min(np.count_nonzero(~np.isnan(values)) for values in (columns.t_s, *_needed(columns).values()))
     if 2 * int(_known(columns).sum()) < rarest:
         columns = _held(columns)
     known = _known(columns)
@@ -158,12 +158,13 @@ def without_missing(columns: GraspColumns) -> GraspColumns:
     return only(columns, known, f"without a number ({columns.place(int(np.argmin(known)))})")
 
 
-def _needed(columns: GraspColumns) -> tuple[Numbers, ...]:
-    return columns.t_s, columns.gap_m, columns.left_n, columns.right_n
+def _needed(columns: GraspColumns) -> dict[str, Numbers]:
+    return {"gap": columns.gap_m, "left force": columns.left_n, "right force": columns.right_n}
 
 
 def _known(columns: GraspColumns) -> NDArray[np.bool_]:
-    known: NDArray[np.bool_] = np.logical_and.reduce([~np.isnan(values) for values in _needed(columns)])
+    every = (columns.t_s, *_needed(columns).values())
+    known: NDArray[np.bool_] = np.logical_and.reduce([~np.isnan(values) for values in every])
     return known
 
 
@@ -173,10 +174,12 @@ def _held(columns: GraspColumns) -> GraspColumns:
     They are the columns themselves if one has no number, or if its own time goes back.
     """
     order = np.argsort(columns.t_s, kind="stable")
-    in_order = all((np.diff(order[~np.isnan(column[order])]) > 0).all() for column in _needed(columns)[1:])
+    in_order = all(
+        (np.diff(order[~np.isnan(column[order])]) > 0).all() for column in _needed(columns).values()
+    )
     if in_order:  # the rows of one come after those of another
         columns = columns.rows(order)
-    values = {"gap": columns.gap_m, "left force": columns.left_n, "right force": columns.right_n}
+    values = _needed(columns)
     rows = {name: np.flatnonzero(~np.isnan(column)) for name, column in values.items()}
     rises = bool((np.diff(columns.t_s) >= 0.0).all()) and np.ptp(columns.t_s) < LONGEST_S
     if not rises or not all(map(len, rows.values())):
@@ -239,12 +242,12 @@ def checked_recording(columns: GraspColumns, *, rate_hz: float | None = None) ->
     steps = _time_steps(columns, rate_hz)
     _check_complete(columns)
     _check_plausible(columns, "gap", "gap", columns.gap_m)
-    _check_plausible(columns, "force", "force", columns.left_n, columns.right_n)
-    _check_plausible(columns, "effort", "force", *(() if columns.effort_n is None else (columns.effort_n,)))
+    _check_plausible(columns, "force", "force", np.concatenate((columns.left_n, columns.right_n)))
+    _check_plausible(columns, "effort", "force", columns.effort_n)
+    _check_plausible(columns, "velocity", "gap", columns.velocity_m_s)
     velocities = columns.velocity_m_s
     if velocities is None:
         velocities = np.diff(columns.gap_m, prepend=columns.gap_m[:1]) / steps
-    _check_plausible(columns, "velocity", "gap", *(() if columns.velocity_m_s is None else (velocities,)))
     _check_plausible(columns, "time between samples", "t", np.array([np.median(steps)]))
     try:
         channels = _channels(columns)
@@ -362,23 +365,21 @@ def _advice_on_times(columns: GraspColumns) -> str:
     """Return what to do about times that do not increase, as far as it would help: it is tried on these times."""
     t_s = columns.t_s
     split = 'If the rows come from several grasps, split the file by a column: split = "COLUMN"'
+    steady = f"leave time out and write rate_hz = SAMPLES A SECOND. {split}"
     steps = np.diff(t_s)
     back = steps < 0.0
     if back.all():
         return "The rows are in the reverse order of time: turn them round"
     if back.any():
         moved = np.abs(np.diff(columns.gap_m)[back])
-        if bool((moved <= GOES_ON * np.ptp(columns.gap_m)).all()):
-            return (
-                "The gap goes on there, as where a counter or a clock begins anew: leave time out and write rate_hz = "
-                "SAMPLES A SECOND. " + split
-            )
-        return split
-    if not t_s[-1] > t_s[0]:
+        goes_on = bool((moved <= GOES_ON * np.ptp(columns.gap_m)).all())
         return (
-            f"All {len(t_s)} rows have one time, as if it had been written with too few digits: leave out time and "
-            "write rate_hz = SAMPLES A SECOND. " + split
+            f"The gap goes on there, as where a counter or a clock begins anew: {steady}"
+            if goes_on
+            else split
         )
+    if not t_s[-1] > t_s[0]:
+        return f"All {len(t_s)} rows have one time, as if it had been written with too few digits: {steady}"
     new = 1 + int((steps > 0.0).sum())
     lost = len(t_s) - new
     values = np.column_stack((columns.gap_m, columns.left_n, columns.right_n))
@@ -402,28 +403,25 @@ def _advice_on_times(columns: GraspColumns) -> str:
 
 
 def _check_complete(columns: GraspColumns) -> None:
-    named = {"gap": columns.gap_m, "left force": columns.left_n, "right force": columns.right_n}
-    for what, values in named.items():
+    for what, values in _needed(columns).items():
         missing = np.flatnonzero(~np.isfinite(values))
         if len(missing) == len(values):
             raise DataDamaged(f"{columns.source}: the {what} has no number")
         if len(missing):
-            raise DataDamaged(
-                f"{columns.source}, {columns.place(int(missing[0]))}: the {what} is missing or infinite"
-            )
+            place = columns.place(int(missing[0]))
+            raise DataDamaged(f"{columns.source}, {place}: the {what} is missing or infinite")
 
 
-def _check_plausible(columns: GraspColumns, quantity: str, unit_of: str, *values: Numbers) -> None:
+def _check_plausible(columns: GraspColumns, quantity: str, unit_of: str, values: Numbers | None) -> None:
     """Raise DataDamaged if a value is far from those of any gripper, as it is in another unit."""
-    if columns.units.get(unit_of, "") or not values:
+    if columns.units.get(unit_of, "") or values is None:
         return
     low, high, unit, others = PLAUSIBLE[quantity]
-    every = np.concatenate(values)
-    worst = int(np.argmax(np.maximum(every - high, low - every)))
-    extreme = float(every[worst])
+    worst = int(np.argmax(np.maximum(values - high, low - values)))
+    extreme = float(values[worst])
     if low <= extreme <= high:
         return
-    beyond = np.count_nonzero((every < low) | (every > high)) / len(every)
+    beyond = np.count_nonzero((values < low) | (values > high)) / len(values)
     if beyond <= GLITCHES:
         raise DataDamaged(
             f"{columns.source}, {columns.place(worst % len(columns))}: the {quantity} is {extreme:g} {unit} there, "
@@ -438,7 +436,7 @@ def _check_plausible(columns: GraspColumns, quantity: str, unit_of: str, *values
     advice = advice[:1] or ["in another unit, multiply it by its factor"]
     if quantity == "force":
         advice += ["in counts [counts]"]
-        advice += ["in gram-force [gf]"] if bool((every == np.round(every)).all()) else []
+        advice += ["in gram-force [gf]"] if bool((values == np.round(values)).all()) else []
     raise DataDamaged(
         f"{columns.source}: the {quantity} reaches {extreme:g} {unit}, which no gripper has. Plausible is "
         f"{low:g} to {high:g} {unit}. If the column is {', '.join(advice)}"

@@ -6,7 +6,6 @@ all.
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from decimal import Decimal
@@ -24,8 +23,10 @@ from graspsense.sources.trial_table.identifiers import (
     TIMES,
     are_even,
     can_be_days,
+    differs_by_label,
     follow_lines,
     groups_of_labels,
+    in_one_block_each,
     is_count,
     is_time,
     name_objects,
@@ -62,14 +63,14 @@ _FROM_ZERO: Final = 0.15
 """Distance from zero of the nearest value, as a share of the range of all, from which on a zero is no measurement."""
 _LONE: Final = 100.0
 """How many times the span of all others a single value is away from them, if it is no measurement."""
-_BY_CHANCE: Final = 1e-4
-"""Probability of an order of lines below which it is no chance."""
 _FEW: Final = 0.1
 """Share of the lines of a label that may differ from the others in whether they have a value."""
 _ROUNDED: Final = 6
 """Most digits of a number that is taken for a rounded one."""
 _MOSTLY: Final = 0.75
 """Share of the lines of each label from which on a value may be the setting that this label was recorded with."""
+_EVEN: Final = 0.005
+"""Probability that drawn values have numbers of lines as even as those of objects, below which it is told."""
 _NEAR: Final = 0.3
 """Largest distance of a number from the whole one that it is rounded to."""
 _ROUNDED_SUM: Final = 0.02
@@ -281,21 +282,7 @@ def values_have_one_label(values: Sequence[str] | Sequence[float], labels: Seque
     if not among < len(different) == len(set(given)):
         return False
     ranges = sum(1 for _ in groupby(sorted(given), key=itemgetter(1)))
-    return texts or ranges > among or are_even([*different.values()])
-
-
-def in_one_block_each(values: Sequence[str], labels: Sequence[str]) -> bool:
-    """Return whether the lines of each value come one after the other, and tell of the label.
-
-    They are several, or it is no chance that those of a label are so, if all orders of its lines are equally likely.
-    """
-    lines, pairs = Counter(values), Counter(zip(values, labels, strict=True))
-    if not 1 < len(lines) == sum(1 for _ in groupby(values)) or len(pairs) == len(lines) * len(set(labels)):
-        return False
-    orders = sum(math.lgamma(n + 1) for n in Counter(labels).values())
-    in_blocks = sum(math.lgamma(n + 1) for n in Counter(label for _, label in pairs).values())
-    in_blocks += sum(math.lgamma(n + 1) for n in pairs.values())
-    return min(lines.values()) >= LEAST_LINES or in_blocks - orders < math.log(_BY_CHANCE)
+    return texts or ranges > among or are_even([*different.values()], _EVEN)
 
 
 def passes_without_a_gap(values: Numbers, labels: Sequence[str]) -> bool:
@@ -312,17 +299,6 @@ def passes_without_a_gap(values: Numbers, labels: Sequence[str]) -> bool:
     steps = np.diff(values[order])
     usual = float(np.median(np.delete(steps, ends)))
     return bool((steps[ends] > 0.0).all() and (steps[ends] <= _USUAL * usual).all())
-
-
-def differs_by_label(values: Numbers, labels: Sequence[str]) -> bool:
-    """Return whether the values of a label vary by less than half of the variance of all values."""
-    known = np.flatnonzero(~np.isnan(values))
-    codes = np.unique(np.array(labels)[known], return_inverse=True)[1]
-    sizes = np.bincount(codes)
-    if len(sizes) < 2 or int(sizes.min()) < LEAST_LINES or np.ptp(values[known]) == 0.0:
-        return False
-    means = np.bincount(codes, weights=values[known]) / sizes
-    return bool(np.var(values[known] - means[codes]) < 0.5 * np.var(values[known]))
 
 
 def follows_from(values: Numbers, target: Numbers) -> bool:

@@ -41,17 +41,13 @@ class ExportedTable:
             notes += columns.keep_where(labelled, "they have no label")
         ended = [outcome not in NOT_ENDED for outcome in columns.cells["outcome"]]
         notes += columns.keep_where(ended, "they did not end by themselves")
-        if "complete" in self.about:
-            notes += columns.keep_where(
-                [cell != "0" for cell in columns.cells["complete"]], "they are incomplete"
-            )
+        if complete := columns.cells.get("complete"):
+            notes += columns.keep_where([cell != "0" for cell in complete], "they are incomplete")
         if not len(columns):
             raise DataDamaged(f"{columns.path} has no labelled trial that ended by itself")
-        if "feature_set" in self.about and len(set(columns.cells["feature_set"])) > 1:
-            newest = [
-                feature_set == columns.cells["feature_set"][-1]
-                for feature_set in columns.cells["feature_set"]
-            ]
+        feature_sets = columns.cells.get("feature_set", [])
+        if len(set(feature_sets)) > 1:
+            newest = [feature_set == feature_sets[-1] for feature_set in feature_sets]
             notes += columns.keep_where(newest, "their features differ from those of the newest trial")
             self.features = [name for name in self.features if not columns.is_blank(name)]
 
@@ -84,7 +80,5 @@ class ExportedTable:
 
 def exported(columns: CsvColumns) -> ExportedTable | None:
     """Return the table that `graspsense export` wrote, None if these columns are not one."""
-    for about in (ABOUT, ABOUT_BEFORE):
-        if tuple(columns.names[: len(about)]) == about:
-            return ExportedTable(columns, about)
-    return None
+    possible = (about for about in (ABOUT, ABOUT_BEFORE) if tuple(columns.names[: len(about)]) == about)
+    return next((ExportedTable(columns, about) for about in possible), None)

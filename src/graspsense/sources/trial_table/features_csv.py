@@ -45,12 +45,10 @@ from graspsense.store.export_table import VALUE
 if TYPE_CHECKING:
     from graspsense.sources.formats.table import Numbers
 
-SMALL: Final = 1e-3
-"""A column that varies by less than this has few values that differ by J48's 1e-5."""
-_ROUNDING: Final = 1e-13
-"""Variation relative to the largest value that is only rounding, and no measurement, as in C4.5 trees."""
+_ROUNDING: Final = (1e-3, 1e-13)
+"""Variation, also relative to the largest value, that is only rounding, and no measurement, as in C4.5 trees."""
 _QUANTITY: Final = frozenset({
-    "variable", "quantity", "parameter", "feature", "measure", "measurement", "metric", "attribute",
+    "variable", "quantity", "parameter", "param", "channel", "feature", "measure", "measurement", "metric", "attribute",
     "merkmal", "gr\u00f6\u00dfe", "messgr\u00f6\u00dfe", "kennwert", "grandeur", "magnitud", "grandezza",
 })  # fmt: skip
 _VALUE: Final = frozenset({"value", "values", "val", "wert", "messwert", "valeur", "valor", "valore"})
@@ -324,7 +322,7 @@ def _ranks(columns: CsvColumns, order: str | None) -> tuple[int, ...]:
 def _loses_digits(cells: Sequence[str], values: Sequence[float]) -> bool:
     """Return whether different whole numbers are the same number, or all numbers are but for rounding."""
     known = np.array([value for value in values if value == value])
-    if len(known) and 0.0 < _span(known) < min(SMALL, _ROUNDING * float(np.abs(known).max())):
+    if len(known) and 0.0 < _span(known) < min(np.multiply(_ROUNDING, (1.0, np.abs(known).max()))):
         return True
     return len(set(values)) < len(set(cells)) and any(abs(value) >= LARGEST_WHOLE for value in values)
 
@@ -371,7 +369,7 @@ def _feature_names(
 ) -> list[str]:
     """Return the columns that are neither reserved nor identifiers. Raises ConfigError, DataDamaged."""
     _refuse_long_form(columns)
-    names, nominal, blank = [], [], "have no values"
+    names, blank = [], "have no values"
     if columns.index:
         notes.append(f"not used, because it is the index that pandas wrote: {columns.index}")
     identifiers: dict[str, list[str]] = {}
@@ -383,13 +381,12 @@ def _feature_names(
             identifiers.setdefault(unused, []).append(name)
         else:
             names.append(name)
-            nominal += [name] if columns.is_nominal(name) else []
     for why, identifier in identifiers.items():
         notes.append(
             f"not used, because they {why}: {listed(identifier)} "
             f"(use {option('features', python='columns')} to include them)"
         )
-    if nominal:
+    if nominal := [name for name in names if columns.is_nominal(name)]:
         notes.append(f"nominal, with a feature for each of their values: {listed(nominal)}")
     if blank in identifiers and not names:
         raise DataDamaged(f"{columns.path}: no feature has any value: {listed(identifiers[blank])}")
@@ -406,18 +403,12 @@ def _note_uninformative_columns(path: Path, table: FeatureTable, notes: list[str
     named = list(zip(table.names, table.values.T, strict=True))
     blank = [name for name, values in named if np.isnan(values).all()]
     having = [(name, values[~np.isnan(values)]) for name, values in named]
-    same = [(name, values.any()) for name, values in having if len(values) and _span(values) == 0.0]
-    constant = [name for name, nonzero in same if nonzero or not splits_of(name)]
+    same = [(name, values) for name, values in having if len(values) and _span(values) == 0.0]
+    constant = [name for name, values in same if values.any() or not splits_of(name)]
     if blank:
         notes.append(f"without any value: {listed(blank)}")
     if constant:
         notes.append(f"constant, and so without information: {listed(constant)}")
-    small = [name for name, values in having if len(values) and 0.0 < _span(values) < SMALL]
-    if small:
-        notes.append(
-            f"below {SMALL:g} in its unit varies {listed(small)}: the classifiers of graspsense answer as they "
-            "do in a smaller unit; Weka's J48 takes values within 1e-05 for equal"
-        )
     share = float(np.isnan(table.values).mean())
     if share > 0.0:
         notes.append(f"{100 * share:.1f} % of all values are missing")

@@ -69,7 +69,7 @@ _COUNTING: Final = 15
 number the repetitions with an object."""
 _BY_CHANCE: Final = 0.005
 _ORDERS: Final = 10_000
-"""Number of orders of the lines within the labels from which on a rank correlation is no chance."""
+"""Number of orders of the lines within the labels, for each of its kind, from which on an order is no chance."""
 _IRREGULAR: Final = 0.7
 """Quartile range of the steps of a clock over their median; of sorted measurements it is 1.6 or more on average."""
 _SPACED: Final = 30
@@ -80,6 +80,8 @@ _ENDS: Final = 2
 """Objects that may have fewer lines than the others: the first and the last one; or the last one of each label."""
 _EVEN: Final = 1e-3
 """Probability that drawn values have numbers of lines as even as those of objects."""
+_TWO: Final = 1.9
+"""Mean number of lines of objects that have two each, but for those at the ends."""
 _HASHED: Final = 1e7
 """Integers from this one on are hashes, if they number objects and are no multiples of 1000."""
 _EPOCH_S: Final = (6.3e8, 4.2e9)
@@ -163,18 +165,24 @@ def identifies(
         return "are dates or times"
     whole = bool((column == np.floor(column)).all())
     values_of = np.unique(column)
-    cells = cells_in_range(values_of) + 1.0
+    cells: float = round(cells_in_range(values_of)) + 1
     if cells < len(values_of):  # a value far from the others hides their grid
         cells = math.inf
     hashed = whole and column.max() >= _HASHED and bool((column % 1000.0).any())
-    if (hashed or cells <= 2.0 * len(values_of)) and name_objects(column.tolist(), known):
+    numbers, on_grid = column.tolist(), hashed or cells <= 2.0 * len(values_of)
+    # Few values are measured equally often by chance.
+    no_chance = are_even([*Counter(numbers).values()]) or in_one_block_each(numbers, known)
+    if on_grid and no_chance and name_objects(numbers, known):
         return NUMBER_OBJECTS
     named = bool(_NAMES & set(words_of(name)))
     different = len(set(zip(column.tolist(), known, strict=True))) >= (1.0 - _TIES) * len(column)
     for lines in [given] if order is None else [given, np.array(order)[given]]:
-        way, in_labels = one_way(column[np.argsort(lines)]), _follows_in_labels(column, lines, known)
-        # A counter of a byte begins anew.
-        counts = len(values_of) >= _COUNTING and way >= 1.0 - _TIES
+        recorded = np.argsort(lines)
+        way, in_labels = one_way(column[recorded]), _follows_in_labels(column, lines, known)
+        blocks = sum(1 for _ in groupby(known[i] for i in recorded.tolist()))
+        # A counter of a byte begins anew. So does what differs by labels that take turns.
+        turns = 2 * blocks > len(known) and differs_by_label(column, known)
+        counts = len(values_of) >= _COUNTING and way >= 1.0 - _TIES and not turns
         follows = different and (way == 1.0 or in_labels)
         like_clock = _is_regular(values_of) or (is_time(unit) and in_labels)
         if ((whole or named) and (counts or follows)) or (follows and like_clock):
@@ -322,6 +330,17 @@ def _ranks(values: NDArray[np.float64], codes: NDArray[np.int64]) -> NDArray[np.
     return ranks - (np.bincount(codes, weights=ranks) / np.bincount(codes))[codes]
 
 
+def differs_by_label(values: NDArray[np.float64], labels: Sequence[str]) -> bool:
+    """Return whether the values of a label vary by less than half of the variance of all values."""
+    known = np.flatnonzero(~np.isnan(values))
+    codes = np.unique(np.array(labels)[known], return_inverse=True)[1]
+    sizes = np.bincount(codes)
+    if len(sizes) < 2 or int(sizes.min()) < LEAST_LINES or np.ptp(values[known]) == 0.0:
+        return False
+    means = np.bincount(codes, weights=values[known]) / sizes
+    return bool(np.var(values[known] - means[codes]) < 0.5 * np.var(values[known]))
+
+
 def _is_regular(values: NDArray[np.float64], most: float = _IRREGULAR) -> bool:
     """Return whether the steps between these rising values are alike, as those of a clock are."""
     low, middle, high = np.quantile(np.diff(values), (0.25, 0.5, 0.75))
@@ -330,13 +349,13 @@ def _is_regular(values: NDArray[np.float64], most: float = _IRREGULAR) -> bool:
 
 def _hardly_repeats(n: int, distinct: int, cells: float) -> bool:
     """Return whether values on a grid repeat too rarely to be measured, if all its cells are as frequent."""
+    from scipy.special import pdtr
+
     ties = n - distinct
     if ties == 0 or math.isinf(cells):
         return bool(np.log1p(-np.arange(n) / max(cells, n)).sum() < math.log(_BY_CHANCE))
-    expected = n - cells * -math.expm1(n * math.log1p(-1.0 / cells))
     # The number of ties is about a Poisson variable.
-    terms = [math.exp(k * math.log(expected) - expected - math.lgamma(k + 1)) for k in range(ties + 1)]
-    return sum(terms) < _BY_CHANCE
+    return bool(pdtr(ties, n - cells * -math.expm1(n * math.log1p(-1.0 / cells))) < _BY_CHANCE)
 
 
 def name_objects(values: Sequence[Hashable], labels: Sequence[str]) -> bool:
@@ -377,15 +396,29 @@ def groups_of_labels(values: Sequence[Hashable], labels: Sequence[str]) -> list[
     return [group[label] if apart else label for label in labels]
 
 
-def are_even(counts: Sequence[int]) -> bool:
+def are_even(counts: Sequence[int], by_chance: float = _EVEN) -> bool:
     """Return whether values have numbers of lines as even as those of objects, by a chi-squared test."""
     from scipy.special import gammainc
 
     mean = sum(counts) / len(counts)
-    uneven = sum((count - mean) ** 2 for count in counts) / mean
-    return mean >= 2.0 and bool(gammainc(0.5 * (len(counts) - 1), 0.5 * uneven) < _EVEN)
+    uneven = (1.0 + sum((count - mean) ** 2 for count in counts)) / mean  # to the middle of the next sum
+    return mean > _TWO and bool(gammainc(0.5 * (len(counts) - 1), 0.5 * uneven) < by_chance)
 
 
 def _enough_objects(objects: int, labels: Sequence[str]) -> bool:
     """Return whether there are more objects than a feature has values that tell the labels apart."""
     return objects >= max(LEAST_LINES, 2 * len(set(labels)) + 1)
+
+
+def in_one_block_each(values: Sequence[Hashable], labels: Sequence[str]) -> bool:
+    """Return whether the lines of each value come one after the other, and tell of the label.
+
+    They are several, or it is no chance that those of a label are so, if all orders of its lines are equally likely.
+    """
+    lines, pairs = Counter(values), Counter(zip(values, labels, strict=True))
+    if not 1 < len(lines) == sum(1 for _ in groupby(values)) or len(pairs) == len(lines) * len(set(labels)):
+        return False
+    orders = sum(math.lgamma(n + 1) for n in Counter(labels).values())
+    in_blocks = sum(math.lgamma(n + 1) for n in Counter(label for _, label in pairs).values())
+    in_blocks += sum(math.lgamma(n + 1) for n in pairs.values())
+    return min(lines.values()) >= LEAST_LINES or orders - in_blocks > math.log(_ORDERS)

@@ -7,7 +7,7 @@ import re
 from collections import Counter
 from collections.abc import Container, Sequence
 from decimal import Decimal, InvalidOperation
-from itertools import takewhile
+from itertools import chain, groupby, pairwise, takewhile
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -47,7 +47,8 @@ def without_summaries(columns: CsvColumns) -> None:
     In the first and the last lines, each has the name of a statistic that its column has nowhere else; an object of
     that name has several trials. Anywhere, the name stands beside that of other lines, as in `mean (can)`, or in a
     column of numbers, as that of a trial; a column of percentages has 50%. A heading is a text that its column has
-    nowhere else, alone in its line. Means and sums of the lines above are known by their numbers, in any language.
+    nowhere else, alone in its line. Means and sums of the lines above are known by their numbers, in any language; with
+    the name of a statistic also those of each group of lines.
     """
     summaries = {i: next(cells[i] for cells in columns.cells.values()) for i in _computed(columns)}
     alone = [sum(map(bool, row)) == 1 < len(row) - 1 for row in zip(*columns.cells.values(), strict=True)]
@@ -75,32 +76,40 @@ def without_summaries(columns: CsvColumns) -> None:
 
 
 @np.errstate(over="ignore", invalid="ignore")  # of numbers that no sensor gives
-def _computed(columns: CsvColumns) -> range:
-    """Return the last lines where a mean or the sum of the lines above them begins, as no trial has by chance."""
+def _computed(columns: CsvColumns) -> set[int]:
+    """Return the lines that are a mean or the sum of lines above them, as no trial is by chance, and those beside them.
+
+    They are the last lines, or have the names of statistics behind most groups of lines.
+    """
     read = {name: columns.numbers_or_none(name) for name in columns.names}
     finite = [name for name, values in read.items() if values is not None and not np.isinf(values).any()]
     finite, n = finite[:_ENOUGH_COLUMNS], len(columns)
     numbers = np.array([read[name] for name in finite]).T
     texts = [columns.cells[name] for name, values in read.items() if values is None]
 
-    def is_of(lines: Sequence[int], i: int) -> bool:
-        named = any(cells[i] not in cells[:i] for cells in texts)
+    def is_of(lines: Sequence[int], i: int, *, named: bool) -> bool:
         places = [
             _places(columns.cells[name][i], number) for name, number in zip(finite, numbers[i], strict=True)
         ]
         chance = _chance_of_mean_or_sum(numbers[lines], numbers[i], np.array(places, dtype=np.float64))
         return chance < (_BY_CHANCE if named else _BY_CHANCE / _COMPARED)
 
-    def is_computed(i: int) -> bool:
-        alike = ([k for k in range(i) if cells[k] == cells[i]] for cells in texts)
-        return any(is_of(lines, i) for lines in (range(i), *alike))
+    def is_computed(i: int, begin: int) -> bool:
+        alike = ([k for k in range(i) if cells[k] == cells[i]] for cells in texts if begin == i)
+        named = any(cells[i] not in cells[:i] for cells in texts)
+        return any(
+            len(lines) >= LEAST_LINES and is_of(lines, i, named=named) for lines in (range(begin), *alike)
+        )
 
     able = range(n - 1, max(n // 2, n - _MOST_LAST) - 1, -1) if finite else range(0)
-    begins = (k for k in able if any(is_of(range(k), i) for i in range(k, n)))
-    begin = next(begins, n)
-    while begin - 1 in able and is_computed(begin - 1):
+    begin = next((k for k in able if any(is_computed(i, k) for i in range(k, n))), n)
+    while begin - 1 in able and is_computed(begin - 1, begin - 1):
         begin -= 1
-    return range(begin, n)
+    statistics = [any(_word(cells[i]) in _STATISTICS for cells in texts) for i in range(n if finite else 0)]
+    runs = pairwise([*run] for _, run in groupby(range(len(statistics)), statistics.__getitem__))
+    behind = [(lines, run) for lines, run in runs if statistics[run[0]]]
+    known = sum(any(is_of(lines, i, named=True) for i in run) for lines, run in behind)
+    return {*range(begin, n), *chain(*(run for _, run in behind if 2 * known > len(behind)))}
 
 
 def _places(cell: str, number: float) -> int:
@@ -117,8 +126,6 @@ def _chance_of_mean_or_sum(lines: Numbers, line: Numbers, places: Numbers) -> fl
 
     They are written with so many decimal places.
     """
-    if len(lines) < LEAST_LINES:
-        return 1.0
     used = ~np.isnan(line) & ~np.isnan(lines).any(axis=0)
     used &= lines.max(axis=0) > lines.min(axis=0)
     lines, line = lines[:, used], line[used]
