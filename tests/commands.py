@@ -27,16 +27,16 @@ class Done(NamedTuple):
         return json.loads(self.stdout)
 
 
-def graspsense(*arguments: object, answers: str = "") -> Done:
+def graspsense(*arguments: object, answers: str = "", encoding: str = "utf-8") -> Done:
     """Run `graspsense ARGUMENTS`, with `answers` as its standard input, and return how it ended."""
     # With bytes below the text, as standard output has them.
-    out, err = (io.TextIOWrapper(io.BytesIO(), "utf-8", newline="", write_through=True) for _ in range(2))
+    out, err = (io.TextIOWrapper(io.BytesIO(), encoding, newline="", write_through=True) for _ in range(2))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sys, "stdin", io.StringIO(answers))
         with redirect_stdout(out), redirect_stderr(err), pytest.raises(SystemExit) as ended:
             main([str(argument) for argument in arguments])
     code = ended.value.code or 0
-    return Done(code, *(stream.buffer.getvalue().decode() for stream in (out, err)))
+    return Done(code, *(stream.buffer.getvalue().decode(encoding) for stream in (out, err)))
 
 
 def printed(*arguments: object, **more: str) -> str:

@@ -73,13 +73,17 @@ def test_whatever_prints_a_text_prints_it_harmlessly(capsys, monkeypatch, stream
 def test_what_the_encoding_of_the_output_lacks_is_escaped(tmp_path, encoding):
     path = tmp_path / "größe カップ 🥤.csv"
     path.write_text("t,gap\n0,1\n1,2\n")
-    command = ["-m", "graspsense", "import", path, "--check"]
-    environ = {**os.environ, "PYTHONIOENCODING": encoding}
-    options = {"cwd": tmp_path, "env": environ, "encoding": encoding, "check": True}
+    command = ["import", path, "--check"]
 
-    assert ".csv" in python(*command, **options).stdout
-    (told,) = json.loads(python(*command, "--json", **options).stdout)
+    assert ".csv" in printed(*command, encoding=encoding)
+    (told,) = json.loads(printed(*command, "--json", encoding=encoding))
     assert told["path"] == str(path)
+
+
+def test_a_process_of_its_own_escapes_what_the_encoding_lacks(tmp_path):
+    environ = {**os.environ, "PYTHONIOENCODING": "ascii"}
+    done = python("-m", "graspsense", "verify", tmp_path / "größe", env=environ, encoding="ascii")
+    assert "gr\\xf6\\xdfe" in done.stdout + done.stderr
 
 
 def test_a_text_of_several_lines_looks_like_no_other_text_and_a_row_of_a_table_is_one_line(capsys):

@@ -32,13 +32,6 @@ from websockets.sync.client import connect
 PATIENCE_S = 60.0
 
 
-@pytest.fixture
-def feed():
-    running = LiveFeed("graspsense.live.page_process", ["127.0.0.1", "0"])
-    yield running
-    assert running.close() == ""
-
-
 @pytest.fixture(scope="module")
 def idle_feed():
     """A page that nobody sends a grasp to."""

@@ -5,7 +5,6 @@ import math
 import resource
 from pathlib import Path
 
-import browser as browsers
 import pytest
 from attrs import evolve
 from live_grasp import COMMAND, device
@@ -13,26 +12,11 @@ from live_grasp import COMMAND, device
 from graspsense.core.pipeline.pipeline import load_pipeline
 from graspsense.core.values.channel import Channel, FastChannel, TactileArray
 from graspsense.core.values.signals import NO_PADS, SQUEEZE, Frame, Image, Reading, Samples
-from graspsense.live.feeds import LiveFeed
 from graspsense.plugin_api import signal_type
 
 pytest.importorskip("websockets")
 pytestmark = pytest.mark.browser
 PAGE_BYTES = resource.getpagesize()
-
-
-@pytest.fixture(scope="module")
-def browser():
-    running = browsers.start()
-    yield running
-    running.close()
-
-
-@pytest.fixture
-def feed():
-    running = LiveFeed("graspsense.live.page_process", ["127.0.0.1", "0"])
-    yield running
-    assert running.close() == ""
 
 
 def shown(browser, script, wanted):

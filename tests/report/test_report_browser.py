@@ -2,7 +2,6 @@
 
 import re
 
-import browser as browsers
 import pytest
 from test_report_signals import CHANNELS, grasp
 
@@ -26,13 +25,6 @@ pytestmark = pytest.mark.browser
 
 WIDTHS = (390, 1280, 1920)
 LABELS = [f"quite_a_long_name_of_a_bottle_{k}:full_and_closed" for k in range(11)]
-
-
-@pytest.fixture(scope="module")
-def browser():
-    running = browsers.start()
-    yield running
-    running.close()
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ import pytest
 from attrs import evolve
 from cases import every_case
 from commands import graspsense, printed
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from graspsense.core.learn.copies import apart_from, learned_from, row_hashes, without_copies
@@ -37,6 +37,7 @@ def copies_said(trials):
     return [note for note in trials.notes if "copies" in note]
 
 
+@settings(max_examples=25)
 @given(
     seed=st.integers(0, 1000),
     times=st.integers(2, 6),

@@ -289,6 +289,7 @@ def test_a_gap_that_stops_for_a_squeeze_does_not_join_it_with_the_next(tmp_path)
     assert [bool(squeeze.notices) for squeeze in squeezes] == [False, False, True, False]
 
 
+@pytest.mark.slow
 @every_case(
     ("pads", "gap_m", "rate", "told"),
     [

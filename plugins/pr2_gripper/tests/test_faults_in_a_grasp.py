@@ -51,6 +51,7 @@ def grasped(controller="hybrid", seed=0, body=NEAR, **faults):
     return gripper_faults.grasped(law, FaultConfig(**faults), seed, **body)
 
 
+@pytest.mark.slow
 def test_a_fault_in_the_squeeze_crushes_nothing_and_without_a_fault_nothing_is_told():
     healthy = grasped()
     at_s = gripper_faults.moments(healthy)["squeeze"]

@@ -462,6 +462,8 @@ def test_few_grasps_are_compiled_only_if_their_code_is_on_disk_or_others_came_be
     assert is_compiled(2, kept=False)
 
 
+# The first one compiles, for half a minute where an earlier run has left nothing on disk.
+@pytest.mark.slow
 @pytest.mark.parametrize("kept", [True, False])
 def test_drawing_and_measuring_are_compiled_for_many_grasps_or_if_their_code_is_on_disk(monkeypatch, kept):
     monkeypatch.setattr(threads, "WORTH_COMPILING", 1)

@@ -217,7 +217,8 @@ def test_a_single_grasp_names_the_term_too(stuff):
     assert "term 'stuff'" in trial["reason"]
 
 
-@every_case("compiled", [False, True])
+# What is compiled here is new in each run.
+@pytest.mark.parametrize("compiled", [False, slow(True)])
 def test_a_law_that_raises_ends_the_grasp_with_the_name_of_the_term(stuff, compiled):
     config = SimConfig(spread=False, sensor="ideal", open_gap_m=0.052)
     done = run_many(config, create("controller", "hybrid"), [stuff("raises")], [0], compiled=compiled)[0]
