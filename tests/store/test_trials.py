@@ -276,7 +276,7 @@ def test_a_number_that_cannot_be_changed_is_refused(store):
         (("--value", "fill [l]=0.2"), r"fill of other trials is in ml, .* write fill \[ml\]=NUMBER"),
         (("--value", "fill [ml]=200"), r"trial 1 has fill \[ml\]=200 already"),
         (("--value", "fill [ml]"), r"write NAME \[UNIT\]=NUMBER"),
-        (("--as-recorded", "weight"), "trial 1 has no weight already"),
+        (("--as-recorded", "weight"), "no number 'weight' already"),
         ((), "give either --value"),
     ):
         code, _, err = changed(store, "value", 1, *given)
