@@ -134,10 +134,8 @@ class Evaluator:
     def by_features(self, pooled: Answers) -> dict[str, RecognitionRate]:
         """Return the rates among trials with features and without any; nothing if all trials have features."""
         chosen = {"with features": ~self._featureless, "without any feature": self._featureless}
-        right, rows = (
-            pooled.right(self.labels),
-            {name: np.flatnonzero(which) for name, which in chosen.items()},
-        )
+        right = pooled.right(self.labels)
+        rows = {name: np.flatnonzero(which) for name, which in chosen.items()}
         among = {name: self.rate_among(right, which.tolist()) for name, which in rows.items() if len(which)}
         return among if self._featureless.any() else {}
 

@@ -57,7 +57,8 @@ def stratified(labels: Sequence[str], k: int, seed: int) -> Folds:
     """
     check_folds(len(labels), k)
     rng = np.random.default_rng(seed)
-    folds, assigned = np.zeros(len(labels), dtype=np.int64), 0
+    folds = np.zeros(len(labels), dtype=np.int64)
+    assigned = 0
     for _, rows in _by_label(labels):
         shuffled = rng.permutation(rows)
         # Continuing where the previous label ended keeps the sizes of all folds equal to within one trial.
