@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import scipy
 from cases import every_case
-from commands import graspsense, printed, refused
+from commands import answered, graspsense, printed, refused
 from recorded_files import write_topics
 
 from graspsense.core.values.errors import ConfigError, DataDamaged
@@ -323,6 +323,23 @@ def test_one_of_several_squeezes_that_is_unlike_the_others_is_told(pads, gap_m, 
     unlike = ["in most grasps" in notice for notice in notices]
     assert unlike == [False, False, told is not None, False, False], notices
     assert told is None or told in notices[2]
+
+
+def test_a_grasp_is_replayed_with_the_thresholds_of_its_import(tmp_path):
+    """The force has noise of 0.3 N about 0.4 N without contact, in which the default finds a contact at once."""
+    rng, (gap, force) = np.random.default_rng(5), squeezing(offset_n=0.4)
+    for k in range(3):
+        left, right = force + rng.normal(0.0, 0.3, (2, len(T_S)))
+        pandas_csv(tmp_path / f"jar_{k}.csv", {"t": T_S, "gap": gap, "L": left, "R": right})
+    keys = 'files = "{label}_{order:d}.csv"\ntime = "t"\ngap = "gap"\nleft = "L"\nright = "R"'
+    source, store = manifest(tmp_path, keys), tmp_path / "store"
+    alone = ("-o", "classifier.type=none")
+    printed("import", source, "--save", store, *alone)
+    stored, replayed = (
+        answered("replay", place)["features"] for place in (f"{store}#2", f"manifest:{source}#2")
+    )
+    assert stored == replayed
+    assert stored["p_first"] == pytest.approx(0.05, abs=1.5e-3)
 
 
 def test_a_force_that_drops_out_while_the_gap_stays_is_told(tmp_path):

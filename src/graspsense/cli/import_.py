@@ -54,8 +54,6 @@ if TYPE_CHECKING:
 
 LISTED: Final = 20
 """Largest number of unreadable recordings whose errors are printed; `--json` lists all."""
-TIMEOUTS: Final = ("move_timeout_s", "steady_timeout_s")
-"""Settings of a controller that would end a grasp before its recording does."""
 PICTURE: Final = "import-check.png"
 FEW: Final = 3
 """Largest number of recordings that are printed one by one."""
@@ -216,26 +214,15 @@ class _Chosen:
 
     def fit(self, recordings: Sequence[ImportedRecording]) -> None:
         """Choose the thresholds that are not given. Raises ConfigError for implausible ones in SI units."""
-        from graspsense.sources.recordings.noise_thresholds import THRESHOLDS, thresholds_for
+        from graspsense.sources.recordings.noise_thresholds import open_thresholds
 
-        self._any_unit = any(recording.labelled.recording.units for recording in recordings)
+        used = [recording.labelled.recording for recording in recordings]
+        self._any_unit = any(recording.units for recording in used)
         if not self._any_unit:
             self._refuse_doubt()
-        controller = self._settings.values.get("controller", {})
-        timeouts: dict[str, float] = {key: controller[key] for key in TIMEOUTS if key in controller}
-        is_open = {key for key in controller if self._settings.origins.get(f"controller.{key}") == "default"}
-        given: dict[str, float] = {
-            key: controller[key] for key in THRESHOLDS if key in controller and key not in is_open
-        }
-        thresholds = thresholds_for(
-            [recording.labelled.recording for recording in recordings], timeouts, given
-        )
-        open_keys = {key for key in thresholds.settings if key.partition(".")[2] in is_open}
-        self.words = (
-            thresholds.words if open_keys or not thresholds.settings else "thresholds: those that are given"
-        )
-        self.words += self._unpredicted
-        self._added = tuple(f"{key}={thresholds.settings[key]!r}" for key in sorted(open_keys))
+        thresholds = open_thresholds(self._settings, used)
+        self.words = f"{thresholds.words}{self._unpredicted}"
+        self._added = thresholds.options
 
     def settings(self, recording: ImportedRecording) -> Settings:
         """Return the settings under which a recording is replayed. Raises ConfigError."""

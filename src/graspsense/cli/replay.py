@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from graspsense.cli.options import force_option, keys_option, pipeline_option, plot_option
 from graspsense.cli.output import echo_values, json_option
 from graspsense.cli.run import draw_grasp, print_trial
+from graspsense.cli.terminal import talk
 from graspsense.core.components.registry import installed
 from graspsense.core.pipeline.wiring import check
 from graspsense.core.settings.layers import Flag
 from graspsense.core.settings.resolved import Settings, resolve
 from graspsense.core.values.trial import trial_as_json
+
+if TYPE_CHECKING:
+    from graspsense.sources.recordings.noise_thresholds import Thresholds
 
 
 @click.command()
@@ -35,7 +39,8 @@ def replay(
     """Compute features and a prediction from a recording, as during the grasp; nothing moves.
 
     FILE.mcap is a recording of graspsense, DIR#NUMBER a trial of a store, and KIND:NAME a file of another reader, for
-    example icub:FOLDER/full_vitamin_water_1.txt, or manifest:FILE.toml#3 for the third grasp of a manifest.
+    example icub:FOLDER/full_vitamin_water_1.txt, or manifest:FILE.toml#3 for the third grasp of a manifest. Of such a
+    file, thresholds of contact and rest that are not set are those that `import` would choose.
     """
     from graspsense.core.pipeline.pipeline import grasp_with
 
@@ -65,6 +70,25 @@ def _settings(recording: str, pipeline: str | None, options: tuple[str, ...], fo
         Flag("RECORDING", "gripper.recording", f"{kind}:{name}" if kind in kinds else recording),
     )
     # The settings of the recording have been accepted when it was made.
-    return resolve(
+    settings = resolve(
         pipeline or "default", experiment=own, options=options, flags=flags, force=force or own is not None
     )
+    if kind in ("store", "mcap"):
+        return settings
+    thresholds = _thresholds_of_import(settings, kind, name)
+    if not thresholds.options:
+        return settings
+    talk(thresholds.words)
+    return resolve(pipeline or "default", options=(*thresholds.options, *options), flags=flags, force=True)
+
+
+def _thresholds_of_import(settings: Settings, kind: str, name: str) -> Thresholds:
+    """Return the thresholds that `import` chooses from a recording, and from the others of its data set."""
+    from graspsense.sources.importing.import_sources import recordings_to_import
+    from graspsense.sources.recordings.dataset_recordings import is_recording_number
+    from graspsense.sources.recordings.noise_thresholds import open_thresholds
+
+    source = f"{kind}:{name}"
+    whole = source.rpartition("#")[0] if is_recording_number(kind, name) else source
+    recordings, _ = recordings_to_import([whole], {}, None)
+    return open_thresholds(settings, [recording.labelled.recording for recording in recordings])

@@ -23,7 +23,7 @@ import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from attrs import frozen
@@ -34,8 +34,13 @@ from graspsense.core.values.signals import NO_GAP
 from graspsense.recording.replayable import Recording
 from graspsense.sources.formats.table import Numbers
 
+if TYPE_CHECKING:
+    from graspsense.core.settings.resolved import Settings
+
 THRESHOLDS: Final[tuple[str, ...]] = ("contact_force_n", "rest_speed_m_s", "rest_window_s")
 """The settings of controllers and features that are chosen here, and that a user may give instead."""
+TIMEOUTS: Final = ("move_timeout_s", "steady_timeout_s")
+"""Settings of a controller that would end a grasp before its recording does."""
 SAMPLE: Final = "sample"
 """The unit of time of a recording without a clock."""
 _NORMAL: Final = 1.4826
@@ -86,6 +91,25 @@ class Thresholds:
 
     settings: Mapping[str, float]
     words: str
+
+    @property
+    def options(self) -> tuple[str, ...]:
+        """The settings as options of a command: `controller.contact_force_n=0.3`."""
+        return tuple(f"{key}={self.settings[key]!r}" for key in sorted(self.settings))
+
+
+def open_thresholds(settings: Settings, recordings: Sequence[Recording]) -> Thresholds:
+    """Return the thresholds that these recordings need, of the keys of the controller that nobody has set."""
+    controller = settings.values.get("controller", {})
+    is_open = {key for key in controller if settings.origins.get(f"controller.{key}") == "default"}
+    timeouts_s: dict[str, float] = {key: controller[key] for key in TIMEOUTS if key in controller}
+    given: dict[str, float] = {
+        key: controller[key] for key in THRESHOLDS if key in controller and key not in is_open
+    }
+    needed = thresholds_for(recordings, timeouts_s, given)
+    chosen = {key: value for key, value in needed.settings.items() if key.partition(".")[2] in is_open}
+    words = needed.words if chosen or not needed.settings else "thresholds: those that are given"
+    return Thresholds(settings=chosen, words=words)
 
 
 def thresholds_for(
