@@ -325,7 +325,7 @@ def test_one_of_several_squeezes_that_is_unlike_the_others_is_told(pads, gap_m, 
     assert told is None or told in notices[2]
 
 
-def test_a_grasp_is_replayed_with_the_thresholds_of_its_import(tmp_path):
+def test_a_grasp_is_replayed_and_evaluated_with_the_thresholds_of_its_import(tmp_path):
     """The force has noise of 0.3 N about 0.4 N without contact, in which the default finds a contact at once."""
     rng, (gap, force) = np.random.default_rng(5), squeezing(offset_n=0.4)
     for k in range(3):
@@ -339,7 +339,9 @@ def test_a_grasp_is_replayed_with_the_thresholds_of_its_import(tmp_path):
         answered("replay", place)["features"] for place in (f"{store}#2", f"manifest:{source}#2")
     )
     assert stored == replayed
-    assert stored["p_first"] == pytest.approx(0.05, abs=1.5e-3)
+    for place in f"store:{store}", f"manifest:{source}":
+        width_m = load_trials(place, options=["features.type=chitta"]).table.values[:, 0]
+        assert width_m == pytest.approx(0.05, abs=1.5e-3)
 
 
 def test_a_force_that_drops_out_while_the_gap_stays_is_told(tmp_path):

@@ -35,8 +35,8 @@ def labelled_recordings(
 ) -> Labelled:
     """Return the labelled recordings of a data set; a note counts those that cannot be read.
 
-    Where force or gap are not in SI units, the thresholds of the features follow from the recordings, and a note says
-    which they are. Raises ConfigError if there are none, and the first error if none can be read.
+    Thresholds of the features follow from the recordings where the defaults do not fit them, and a note says which they
+    are. Raises ConfigError if there are none, and the first error if none can be read.
     """
     facts: list[LabelledRecording] = []
     rows: list[tuple[Features, Features]] = []
@@ -83,9 +83,7 @@ def labelled_recordings(
 
 
 def _fitted(features: FeatureSet[Any], recordings: Sequence[Recording]) -> tuple[FeatureSet[Any], list[str]]:
-    """Return the features with thresholds from recordings in other units than SI, where they have the defaults."""
-    if not any({"gap", "force_left"} & recording.units.keys() for recording in recordings):
-        return features, []
+    """Return the features with the thresholds that these recordings need, where they have the defaults, and why."""
     config, default = features.config, type(features.config)()
     keys = [key for key in THRESHOLDS if hasattr(config, key)]
     given = {key: getattr(config, key) for key in keys if getattr(config, key) != getattr(default, key)}
