@@ -116,6 +116,11 @@ def test_what_is_written_reads_back_to_the_bit(tmp_path_factory, rows):
 def test_a_table_without_labels(csv):
     trials, _ = read_table(csv(GOOD), ["f_steady", "p_first"])
     assert (trials.names, trials.values[0].tolist()) == (("f_steady", "p_first"), [6.0, 0.05])
+    # A line of separators between others moves the numbers of trials, one behind them does not.
+    lines = GOOD.splitlines()
+    spaced, notes = read_table(csv("\n".join([*lines[:3], ",,", *lines[3:], ",,"])), ["f_steady", "p_first"])
+    assert spaced.values.tolist() == trials.values.tolist()
+    assert [note for note in notes if "left out" in note] == ["left out: 1 line of empty cells (line 4)"]
 
 
 def test_a_word_in_several_cells_of_a_column_of_numbers_counts_as_missing(csv):

@@ -158,6 +158,7 @@ class _Layout:
         if all(re.fullmatch(r"\s*\|.*\|\s*", line) for _, line in plain):
             plain = [(number, line.strip()[1:-1]) for number, line in plain]
         self.separator = given[1] if given else _separator([line for _, line in _sample(plain)])
+        self.blank: list[int] = []
         self.rows = _with_remarks(list(self._checked(self._rows(plain))))
 
     def table(self, ended: bool) -> TextTable:
@@ -180,6 +181,8 @@ class _Layout:
                 )
         if later := [number for number, _ in self.comments if rows and number > rows[0][0]]:
             self._tell(later, "comment")
+        if between := [number for number in self.blank if rows and rows[0][0] < number < rows[-1][0]]:
+            self._tell(between, "line of empty cells")
         return TextTable(
             names=tuple(" ".join(name.split()) for name in names),  # in quotes, one can have several lines
             units=tuple(unit.strip("[]()") for unit in (units or [""] * len(names))[: len(names)]),
@@ -205,10 +208,11 @@ class _Layout:
             raise DataDamaged(f"{self.path}, line {number}: {error}") from None
 
     def _checked(self, rows: Iterator[Row]) -> Iterator[Row]:
-        """Yield the rows that are not empty. Raises DataDamaged for too many cells, before they are kept."""
+        """Yield the rows that are not empty, and keep the numbers of the others. Raises DataDamaged for too many."""
         cells, most, widest = 0, CELLS.most, COLUMNS.most
         for number, row in rows:
             if not any(row):
+                self.blank.append(number)
                 continue
             cells += len(row)
             if len(row) > widest or cells > most:
