@@ -43,9 +43,11 @@ class Wayward(Classifier):
         self.lock = threading.Lock()
 
     def fit(self, table, labels, seed):
-        how = "fine" if os.environ.get("WAYWARD_TAMED") else self.config.how
+        # Files whose names are not in the code, which would be inputs of every task.
+        marks = Path(os.environ["WAYWARD_MARKS"])
+        how = "fine" if marks.with_suffix(".tamed").exists() else self.config.how
         self.labels = tuple(sorted(set(labels)))
-        mark = Path(os.environ["WAYWARD_MARKS"]) / f"{how}-{seed}"
+        mark = marks / f"{how}-{seed}"
         if how == "raises":
             raise Unpicklable("as it is told to")
         if how == "kills" or (how == "kills once" and not mark.exists()):
@@ -58,7 +60,7 @@ class Wayward(Classifier):
         if how == "waits":
             # Until it is told to go on: a task that is being done while something else happens.
             mark.touch()
-            while not (Path(os.environ["WAYWARD_MARKS"]) / "go").exists():
+            while not marks.with_suffix(".go").exists():
                 time.sleep(0.02)
 
     def classes(self):

@@ -17,6 +17,7 @@ import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext, redirect_stdout
 from enum import Enum
+from functools import partial
 from io import StringIO
 from typing import IO, Final
 from unicodedata import combining, east_asian_width
@@ -74,9 +75,11 @@ def results_alone_on_stdout() -> Iterator[None]:
 
 
 def print_values_alone(asked: bool) -> None:
-    """If asked, have stdout get no text until the context of the results ends, only values."""
+    """If asked, have stdout get only values, and no text, until the context of the results ends, or the command."""
     global _as_values
     _as_values = asked
+    if asked and _results is None:  # a command that a test invokes by itself
+        click.get_current_context().call_on_close(partial(print_values_alone, False))
 
 
 def values_alone() -> bool:

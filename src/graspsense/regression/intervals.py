@@ -16,7 +16,6 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from graspsense.core.learn.certainty import bands_of
 from graspsense.core.learn.conformal import COVERAGE, calibrated_threshold, reach_of, units_needed
 from graspsense.core.learn.stored_values import StoredValues
 
@@ -76,16 +75,14 @@ def intervals_of(
         return PredictionIntervals(
             reason=f"{count} calibration {unit}, {100 * COVERAGE:.0f} % needs {needed}"
         )
-    _, unit_of, trials_of_unit = np.unique(units, return_inverse=True, return_counts=True)
-    least = max(BAND_UNITS, BAND_SHARE * count)
-    begins = bands_of(predicted, 1.0 / trials_of_unit[unit_of], np.unique(predicted).tolist(), least)
+    begins = _begins(predicted, units, max(BAND_UNITS, BAND_SHARE * count))
     bands = np.searchsorted(np.array(begins), predicted, side="right")
     widths = [
         -calibrated_threshold(-np.abs(errors[rows]), units[rows], COVERAGE)
         for rows in (bands == band for band in range(len(begins) + 1))
     ]
     reach = math.inf if outside is None else reach_of(outside, units)
-    return PredictionIntervals(begins=tuple(begins), half_widths=tuple(widths), reach=reach)
+    return PredictionIntervals(begins=begins, half_widths=tuple(widths), reach=reach)
 
 
 def intervals_from(kept: StoredValues) -> PredictionIntervals:
@@ -102,3 +99,15 @@ def intervals_from(kept: StoredValues) -> PredictionIntervals:
         reason=kept.text("reason"),
         reach=kept.number("reach", least=0.0) if "reach" in kept else math.inf,
     )
+
+
+def _begins(predicted: NDArray[np.float64], units: NDArray[np.str_], least: float) -> tuple[float, ...]:
+    """Return where the bands begin after the first, so that each has enough units."""
+    begins: list[float] = []
+    low = -np.inf
+    for value in np.unique(predicted).tolist():
+        below = units[(predicted >= low) & (predicted < value)]
+        if min(len(np.unique(below)), len(np.unique(units[predicted >= value]))) >= least:
+            begins.append(value)
+            low = value
+    return tuple(begins)

@@ -359,19 +359,20 @@ def _demand_same_course(subject: Subject, advice: str, **clock: float) -> None:
         abs(usual_s - other_s) <= ABOUT_AS_LONG * usual_s and usual == other,
         f"a grasp ends as {usual} after {usual_s:.2f} s, and with {given} as {other} after {other_s:.2f} s: {advice}",
     )
-    for phase in (APPROACH, SQUEEZE, HOLD):
-        for name in Command._fields[1:]:
-            late_s = _lateness_s(*(_course(ticks, phase, name) for ticks in grasps))
-            demand(
-                late_s <= LATEST_S,
-                f"with {given}, {name} of its commands in {Phase(phase).name} comes {late_s:.2g} s too early or late: "
-                f"{advice}",
-            )
+    for name in Command._fields[1:]:
+        late_s = _lateness_s(*(_approach(ticks, name) for ticks in grasps))
+        demand(
+            late_s <= LATEST_S,
+            f"with {given}, {name} of its commands in APPROACH comes {late_s:.2g} s too early or late: {advice}",
+        )
 
 
-def _course(ticks: Sequence[Tick], phase: int, name: str) -> NDArray[np.float64]:
-    """Return the times (s) since the begin of a phase, and this number of its commands at each: 2 x ticks."""
-    among = [tick for tick in ticks if tick.state.phase == phase]
+def _approach(ticks: Sequence[Tick], name: str) -> NDArray[np.float64]:
+    """Return the times (s) since the begin of the approach, and this number of its commands at each: 2 x ticks.
+
+    What a law commands in a squeeze may depend on measurements, which differ with the rate.
+    """
+    among = [tick for tick in ticks if tick.state.phase == APPROACH]
     numbers = [(tick.frame.t_s - among[0].frame.t_s, getattr(tick.command, name)) for tick in among]
     course: NDArray[np.float64] = np.array(numbers).reshape(-1, 2).T
     course[np.isinf(course)] = 0.0

@@ -243,7 +243,7 @@ def certainty_of(
     effect *= _alike(np.bincount(unit_of, weights * correct).astype(np.float64))
     least_units = max(STEP_UNITS, STEP_SHARE * float(weights.sum()))
     guessing = 1.0 / max(len(set(labels.tolist())), 2)
-    edges = [0.0, *bands_of(known, weights, SUPPORT_BOUNDS, CLASS_UNITS), np.inf]
+    edges = [0.0, *_begins(known, weights, SUPPORT_BOUNDS, CLASS_UNITS), np.inf]
     classes = []
     for least, end in pairwise(edges):
         rows = (known >= least) & (known < end)
@@ -338,7 +338,7 @@ def with_certainty(
     return result
 
 
-def bands_of(
+def _begins(
     values: NDArray[np.float64], weights: NDArray[np.float64], bounds: Sequence[float], least: float
 ) -> list[float]:
     """Return at which of these rising bounds a new band of values begins, so that each band has this weight."""
@@ -366,7 +366,7 @@ def _steps(
 
     probability = np.round(probability, 9)
     values = np.unique(probability)
-    edges = [float(values[0]), *bands_of(probability, weights, values.tolist(), least_units)]
+    edges = [float(values[0]), *_begins(probability, weights, values.tolist(), least_units)]
     bins = np.searchsorted(edges[1:], probability, side="right")
     all_of, right_of = np.bincount(bins, weights), np.bincount(bins, weights * right)
     rising = isotonic_regression(right_of / all_of, weights=all_of).x

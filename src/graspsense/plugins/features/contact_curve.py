@@ -34,9 +34,8 @@ STILL_CLOSED: Final = 0.02
 LOADED: Final = 0.95
 """Share of the largest force at which the loading ends; a plateau reaches the largest force itself by noise only."""
 LEAST_SAMPLES: Final = 3
-"""Fewest samples of a contact, and in a rise or a fall of the force that tell where in it the contact begins, or ends.
-"""
-UNRESOLVED: Final = "contact not resolved: fewer than three samples in the {} of the force"
+"""Fewest samples of a contact, and in a rise of the force that tell where in it the contact begins."""
+UNRESOLVED: Final = "contact not resolved: fewer than three samples in the rise of the force"
 
 
 Known = dict[str, float | str]

@@ -168,7 +168,7 @@ class CurveFeatures(FeatureSet[CurveConfig]):
         else:
             known = {"contact_gap": curve.contact_gap_m, **self._squeeze(curve)}
             if not curve.resolved:
-                known |= _all(_OF_RISE, UNRESOLVED.format("rise"))
+                known |= _all(_OF_RISE, UNRESOLVED)
         return features_of(self, known, trace, OF_GAP)
 
     def _squeeze(self, curve: ContactCurve) -> Known:
@@ -277,8 +277,6 @@ class CurveFeatures(FeatureSet[CurveConfig]):
         let_go = first_crossing(t_s, -curve.lowest_n[after], -self.config.contact_force_n)
         if let_go is None:
             return _all(_RELEASE, "the trace ends before the pads lose contact in the release")
-        if np.count_nonzero(t_s < let_go) <= LEAST_SAMPLES:
-            return _all(_RELEASE, UNRESOLVED.format("fall"))
         done, left = curve.work(np.array([curve.end_s, let_go])).tolist()
         begin_n = float(np.interp(curve.end_s, curve.t_s, curve.force_n))
         high = first_crossing(t_s, -curve.force_n[after], -LOADS[2] * begin_n)

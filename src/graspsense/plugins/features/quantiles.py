@@ -86,7 +86,7 @@ class QuantileFeatures(FeatureSet[ContactThreshold]):
         lost_s = first_crossing(curve.t_s[last:], -curve.lowest_n[last:], -contact_force_n)
         end_s = float(curve.t_s[last]) if lost_s is None else lost_s
         values: list[float | str] = [
-            curve.contact_gap_m if curve.resolved else UNRESOLVED.format("rise"),
+            curve.contact_gap_m if curve.resolved else UNRESOLVED,
             end_s - start_s,
         ]
         inside = (samples.t_s >= start_s) & (samples.t_s <= end_s)
