@@ -194,10 +194,6 @@ def table_of(rows: Iterable[Features]) -> FeatureTable:
     return collected.table()
 
 
-def _texts(items: Iterable[str]) -> tuple[str, ...]:
-    return tuple(items)
-
-
 def _reasons(items: Iterable[Reason | str]) -> tuple[Reason, ...]:
     return tuple(item if isinstance(item, Reason) else Reason(words=item) for item in items)
 
@@ -225,10 +221,10 @@ class Prediction:
     label: str
     probabilities: Mapping[str, float]
     because: tuple[Reason, ...] = field(converter=_reasons)
-    warnings: tuple[str, ...] = field(default=(), converter=_texts)
+    warnings: tuple[str, ...] = field(default=(), converter=tuple[str, ...])
     model: str = ""
     support: tuple[float, float] | None = None
-    prediction_set: tuple[str, ...] = field(default=(), converter=_texts)
+    prediction_set: tuple[str, ...] = field(default=(), converter=tuple[str, ...])
     coverage: float | None = None
     calibrated: bool = False
     no_certainty: str = ""
