@@ -10,13 +10,12 @@ from graspsense.core.values.display import sentence, table
 from graspsense.core.values.features import Features, Prediction, certainty_words
 from graspsense.core.values.trace import Trace
 from graspsense.core.values.trial import Trial
-from graspsense.core.values.units import display_unit, quantity
-from graspsense.report.further_channels import channel_figures, envelope
-from graspsense.report.moments import contact_time, phase_spans, shown_from
-from graspsense.report.svg import INKS, AxisScale, Picture, reaching
+from graspsense.core.values.units import quantity
+from graspsense.report.further_channels import channel_figures
+from graspsense.report.grasp_curve import grasp_curve
 from graspsense.report.tactile import tactile_figures
 from graspsense.report.trace_plot import plot as plot
-from graspsense.report.traces import OTHER_PHASE, PHASES
+from graspsense.report.traces import one_grasp
 
 LEAST_SHOWN: Final = 0.005
 """A class that is less probable than this is not listed."""
@@ -42,7 +41,7 @@ def html(value: object) -> str:
         case Trial():
             return trial_html(value)
         case Trace():
-            return sentence(value.words) + _pictures(value, ())
+            return _pictures(value, ())
         case Features():
             return features_html(value)
         case Prediction():
@@ -94,36 +93,8 @@ def trial_html(trial: Trial) -> str:
 
 
 def _pictures(trace: Trace, channels: Sequence[Channel]) -> str:
-    """Return the curve of a grasp, its tactile arrays and its further channels, as a page draws them."""
-    figures = [_curve(trace), *tactile_figures(trace, channels), *channel_figures(trace, channels)]
+    """Return a grasp, its tactile arrays and its further channels, as a page draws them."""
+    grasp = one_grasp(grasp_curve(trace, "an object", 0), trace.words) or sentence(trace.words)
+    figures = [grasp, *tactile_figures(trace, channels), *channel_figures(trace, channels)]
     style = ";".join(f"{name}:{colour}" for name, colour in COLOURS.items())
     return f'<div style="{style};max-width:420px;font-family:sans-serif">{"".join(figures)}</div>'
-
-
-def _curve(trace: Trace) -> str:
-    """Return pad forces and gap over time, with the phases behind them."""
-    start, unit = shown_from(trace), trace.units
-    t = trace.t_s[start:] - (contact_time(trace) or 0.0)
-    shown, factor = display_unit(unit["gap"])
-    picture = Picture(314.0)
-    right = picture.width - 10.0
-    x = AxisScale(float(t[0]), float(t[-1]), 36.0, right) if len(t) else AxisScale(0.0, 1.0, 36.0, right)
-    for name, begin, end in phase_spans(t, trace.phase[start:]):
-        left, width = x(begin), x(end) - x(begin)
-        picture.box(left, 30.0, width, 250.0, PHASES.get(name, OTHER_PHASE))
-        if width > 7.0 * len(name):
-            picture.text(left + width / 2.0, 166.0, name, anchor="middle")
-    pads = {"left pad": trace.force_left_n[start:], "right pad": trace.force_right_n[start:]}
-    forces = [*pads["left pad"].tolist(), *pads["right pad"].tolist(), 1.0]
-    gaps = factor * trace.gap_m[start:]
-    force, gap = reaching(forces, 150.0, 30.0, zero=True), reaching(gaps.tolist(), 280.0, 186.0)
-    picture.x_axis(x, 30.0, 280.0, "")
-    picture.y_axis(force, 36.0, right, f"force, {unit['force_left']}")
-    picture.y_axis(gap, 36.0, right, f"gap, {shown}")
-    lines = [*((name, values, force) for name, values in pads.items()), ("gap", gaps, gap)]
-    for ink, (name, values, scale) in zip(INKS, lines, strict=False):
-        picture.line([(x(t_s), scale(value)) for t_s, value in envelope(t, values)], ink, name=name)
-    for place, name, ink in ((right - 70.0, "left pad", INKS[0]), (right, "right pad", INKS[1])):
-        picture.text(place, 14.0, name, anchor="end", ink=ink)
-    picture.text(right, 310.0, f"time, {unit['t']}", anchor="end")
-    return picture.svg(trace.words, unit["t"])
