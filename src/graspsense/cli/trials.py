@@ -130,7 +130,7 @@ def restore(refs: Sequence[str], why: str) -> None:
     """Bring trials back that were set aside."""
     from graspsense.store import changes
 
-    _change(refs, lambda store, numbers: changes.restore(store, numbers, why))
+    _change(refs, lambda store, numbers: changes.set_aside(store, numbers, why, aside=False))
 
 
 @trials.command("history")

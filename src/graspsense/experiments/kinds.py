@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 from attrs import frozen
@@ -14,9 +14,6 @@ from graspsense.core.values.errors import ComponentFailed
 from graspsense.core.values.json_values import json_text
 from graspsense.evaluation.json_codec import from_json, to_json
 
-TaskFunction = Callable[[Mapping[str, Any], int], Any]
-"""Takes the parameters and the seed of a task. Returns its result, which depends on these two alone."""
-
 
 @frozen
 class TaskKind:
@@ -26,11 +23,6 @@ class TaskKind:
     """
 
     declared: Resource[ExperimentKindEntry]
-
-    def function(self) -> TaskFunction:
-        """Return the function that runs a task."""
-        function: TaskFunction = self.declared.load("run")
-        return function
 
     def keys_class(self) -> type:
         """Return the class of the keys under `[judge]`."""
@@ -66,10 +58,7 @@ class TaskKind:
 
     def findings(self) -> Callable[[Any], Any] | None:
         """Return the function that reports the findings, None if the rates are the whole report."""
-        if not self.declared.entry.findings:
-            return None
-        function: Callable[[Any], Any] = self.declared.load("findings")
-        return function
+        return self.declared.load("findings") if self.declared.entry.findings else None
 
 
 def kind_of(name: str) -> TaskKind:

@@ -101,8 +101,10 @@ def compiled_extraction(extract: Callable[[Trace], Any] | None) -> CompiledExtra
     if own is not None:
         extraction: CompiledExtraction | None = own()
         return extraction
+    if not isinstance(extract, MethodType):
+        return None
     # The mark is on the function, so that none applies to a subclass or a test that replaces `extract`.
-    form = getattr(extract.__func__, "compiled", None) if isinstance(extract, MethodType) else None
+    form: CompiledFeatures | None = getattr(extract.__func__, "compiled", None)
     if form is None:
         return None
     # Imported here, since the declarations of a feature set are read without numpy.
@@ -111,8 +113,7 @@ def compiled_extraction(extract: Callable[[Trace], Any] | None) -> CompiledExtra
     feature_set = extract.__self__
 
     def result(measured: Numbers) -> Features:
-        features: Features = form.features(feature_set, measured, SI_UNITS)
-        return features
+        return form.features(feature_set, measured, SI_UNITS)
 
     return CompiledExtraction(form.measure, form.params(feature_set), result, form.reads_release)
 
