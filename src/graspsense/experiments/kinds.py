@@ -26,8 +26,7 @@ class TaskKind:
 
     def keys_class(self) -> type:
         """Return the class of the keys under `[judge]`."""
-        cls: type = self.declared.class_of_kind("keys")
-        return cls
+        return self.declared.class_of_kind("keys")
 
     def result_class(self) -> type:
         """Return the class of the result."""
@@ -35,8 +34,7 @@ class TaskKind:
             from graspsense.experiments.task_results import RecognitionResult
 
             return RecognitionResult
-        cls: type = self.declared.class_of_kind("result")
-        return cls
+        return self.declared.class_of_kind("result")
 
     def encoded(self, returned: Any) -> Any:
         """Return the JSON values of what `run` returned. Raises ComponentFailed if it cannot be read from them."""
