@@ -1,15 +1,13 @@
 """`graspsense plugins check` and `new`: what they print, and how they end."""
 
 import json
-import os
 
 import parts
 import pytest
-from commands import graspsense, printed, python, refused
+from commands import graspsense, printed, refused
 from mutants import MUTANTS
 
 from graspsense.core.components.registry import IsolatedPlugins
-from graspsense.scaffold.make import make
 from graspsense.testing import CHECKS
 
 CHECKS_WITH_SETTINGS = {"settings-survive-a-file", "reports-a-lost-device", "reports-a-missing-device"}
@@ -63,44 +61,6 @@ def test_settings_reach_the_part_that_is_checked(monkeypatch):
 
 def test_a_name_that_nobody_has():
     assert "'chitta'?" in refused("plugins", "check", "chita")
-
-
-OLD = """import graspsense.plugin_api as api
-from graspsense.plugin_api import (
-    Channel,
-    Stillness,
-    tare,
-)
-bound = api.bind
-"""
-
-
-@pytest.mark.slow
-def test_imports_that_moved_are_printed_with_the_new_form_beside(tmp_path):
-    make("lab-old", ["observer"], tmp_path / "old")
-    source = tmp_path / "old" / "src"
-    for path in (source / "lab_old" / "older.py", source / "lab_old" / "plugin.py"):
-        path.write_text(OLD + (path.read_text() if path.exists() else ""))
-    (source / "lab_old-1.dist-info").mkdir()
-    (source / "lab_old-1.dist-info" / "METADATA").write_text(
-        "Metadata-Version: 2.1\nName: lab-old\nVersion: 1\n"
-    )
-    (source / "lab_old-1.dist-info" / "entry_points.txt").write_text(
-        "[graspsense.plugins]\nlab-old = lab_old.plugin\n"
-    )
-
-    ran = python(
-        "-m", "graspsense", "plugins", "check", "lab-old", env={**os.environ, "PYTHONPATH": str(source)}
-    )
-
-    assert ran.returncode == 1, ran.stderr
-    said = ran.stdout + ran.stderr
-    old = "from graspsense.plugin_api import"
-    for module in ("older", "plugin"):
-        assert f"{module}.py:4: {old} Stillness -> from graspsense.plugin_api import RestState" in said
-        assert f"{module}.py:5: {old} tare -> from graspsense.gripper_api import tare" in said
-        assert f"{module}.py:7: api.bind -> from graspsense.simulator_api import bind" in said
-    assert "Channel ->" not in said
 
 
 def test_a_group_without_a_command_prints_its_help_once():

@@ -94,11 +94,11 @@ RESOURCES = {
 }
 """Hooks of resources; the kind, the name, and a field with its value of what its example gives."""
 OBSERVERS = {
-    "graspsense_run_starting": ("run_starting", (RUN,), "started", 7),
-    "graspsense_grasp_event": ("grasp_event", (RUN, EVENT), "events", "both pads touch"),
-    "graspsense_run_finished": ("run_finished", (RUN, a_trial()), "outcomes", "steady"),
+    "graspsense_run_starting": ({"run": RUN}, "started", 7),
+    "graspsense_grasp_event": ({"run": RUN, "event": EVENT}, "events", "both pads touch"),
+    "graspsense_run_finished": ({"run": RUN, "trial": a_trial()}, "outcomes", "steady"),
 }
-"""Hooks that observe a grasp; how they are called, and what the example appends to which list."""
+"""Hooks that observe a grasp; with what they are called, and what the example appends to which list."""
 ASKED = {
     "graspsense_diagnose": (
         ("these settings", 0.25),
@@ -130,10 +130,10 @@ def test_a_resource_hook_gives_its_resource(hook):
 
 @every_case("hook", OBSERVERS)
 def test_an_observer_hook_is_called_with_what_it_observes(hook):
-    method, arguments, kept, value = OBSERVERS[hook]
+    arguments, kept, value = OBSERVERS[hook]
     module = example(hook)
 
-    getattr(IsolatedPlugins(module), method)(*arguments)
+    IsolatedPlugins(module).collect(hook, **arguments)
 
     assert getattr(module, kept) == [value]
 
@@ -225,8 +225,8 @@ def test_an_observer_that_raises_stops_nobody_and_is_reported_once(caplog, kind)
         plugins.add(plugin, name)
 
     with caplog.at_level(logging.WARNING, "graspsense.plugins"):
-        plugins.grasp_event(RUN, EVENT)
-        plugins.grasp_event(RUN, EVENT)
+        for _ in range(2):
+            assert plugins.collect("graspsense_grasp_event", run=RUN, event=EVENT) == ()
 
     assert seen.events == ["both pads touch", "both pads touch"]
     assert [record.getMessage() for record in caplog.records] == [
@@ -239,7 +239,7 @@ def test_an_observer_does_not_swallow_an_interrupt():
     interrupted = implementing("graspsense_run_starting", raising(KeyboardInterrupt()))
 
     with pytest.raises(KeyboardInterrupt):
-        IsolatedPlugins(interrupted).run_starting(RUN)
+        IsolatedPlugins(interrupted).collect("graspsense_run_starting", run=RUN)
 
 
 def test_a_hook_that_a_plugin_owns_collects_from_all_that_implement_it(caplog):

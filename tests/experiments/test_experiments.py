@@ -420,7 +420,7 @@ def test_train_here_test_there(file, tmp_path):
     )
     planned, results = read_experiment(str(file), ["seeds=1"]), Results(tmp_path / "out")
     run_experiment(planned, results, Serial)
-    condition = summarise(planned, results).condition(classifier="c45")
+    condition = next(c for c in summarise(planned, results).conditions if c.classifier == "c45")
 
     assert condition.protocol == "other_trials"
     assert condition.confusion.n == 40

@@ -2,7 +2,6 @@
 
 import re
 import sys
-from xml.etree import ElementTree
 
 import pytest
 from attrs import evolve
@@ -75,10 +74,9 @@ def test_a_trace_shows_a_curve_also_without_forces_and_without_ticks():
     blind = with_channels(whole, {"gap"})
     for trace in (whole, blind, with_channels(whole, set()), whole.until(-1.0)):
         svgs = re.findall(r"<svg.*?</svg>", trace._repr_html_(), re.DOTALL)
-        picture, *_ = [ElementTree.fromstring(svg) for svg in svgs]
+        assert bool(svgs) == bool(len(trace))
         assert "nan" not in "".join(svgs)
-        assert picture.get("aria-label") in repr(trace)
-        shown(trace)
+        assert trace.words in shown(trace)
     assert "forces" not in repr(blind)
     assert repr(whole.until(-1.0)) == "<Trace: no ticks>"
 

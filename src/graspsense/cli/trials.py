@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import click
+from attrs import asdict
 
 from graspsense.cli.output import echo_values, json_option
 from graspsense.cli.sources import named_store
@@ -49,7 +50,7 @@ def list_trials(folder: str, label: str | None, aside: bool | None, limit: int) 
         page = store.page(label=label, set_aside=aside, limit=limit)
         changes = history(store)
     last_relabel = {change.trial: change for change in changes if change.action == "relabel"}
-    echo_values([{**trial.as_json(), "relabelled": trial.id in last_relabel} for trial in page])
+    echo_values([{**asdict(trial), "relabelled": trial.id in last_relabel} for trial in page])
     rows = []
     for trial in page:
         states = [f"set aside: {trial.set_aside}" if trial.set_aside is not None else ""]
@@ -130,7 +131,7 @@ def restore(refs: Sequence[str], why: str) -> None:
     """Bring trials back that were set aside."""
     from graspsense.store import changes
 
-    _change(refs, lambda store, numbers: changes.restore(store, numbers, why))
+    _change(refs, lambda store, numbers: changes.set_aside(store, numbers, why, aside=False))
 
 
 @trials.command("history")

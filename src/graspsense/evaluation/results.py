@@ -8,7 +8,7 @@ from typing import Any
 from attrs import field, frozen
 
 from graspsense.core.learn.labelled import Target, recognised
-from graspsense.core.values.display import sentence, table
+from graspsense.core.values.display import html
 from graspsense.core.values.label_text import natural_order
 from graspsense.core.values.printable import in_one_line
 from graspsense.evaluation.doubt import Reliability, SetCoverage
@@ -115,20 +115,12 @@ class Evaluation:
         return recognised(self.target, self.confusion.labels)
 
     def __repr__(self) -> str:
-        return in_one_line(f"<Evaluation: {self._words()}>")
+        return in_one_line(f"<Evaluation: {self.words}>")
 
     def _repr_html_(self) -> str:
-        rows = [
-            (
-                name,
-                "not measured" if measurement.rate is None else measurement.rate.words,
-                measurement.reason or measurement.what,
-            )
-            for name, measurement in {**self.protocols, **self.controls}.items()
-        ]
-        parts = [sentence(self._words(), strong=True)]
-        parts += [sentence(f"warning: {warning}") for warning in self.warnings]
-        return "".join([*parts, table(("protocol or control", "rate", "what it is"), rows)])
+        return html(self)
 
-    def _words(self) -> str:
+    @property
+    def words(self) -> str:
+        """The classifier, the source, the rate and the protocol, in one line."""
         return f"{self.classifier} on {self.source}: {self.headline.words}, {self.protocol}"

@@ -110,7 +110,12 @@ class CasePlan:
             sources = [source for source in (case.data, case.test) if source is not None]
             if self.complaints or not sources:
                 return
-            inert = set.intersection(*map(_without_effect, sources))
+            inert = set.intersection(
+                *(
+                    {*tables_without_effect(source), *(f"data.{key}" for key in keys_without_effect(source))}
+                    for source in sources
+                )
+            )
             named = " and ".join(source.source for source in sources)
             keys = [dotted(path) for path in sweep if {path[0], dotted(path[:2])} & inert]
             twin = seen.setdefault(_what_matters(case, inert), case)
@@ -301,11 +306,6 @@ class CasePlan:
                     )
                 seen.add(name)
                 yield LearnerSpec(name=name, type=component.qualified, config=config)
-
-
-def _without_effect(source: TrialSource) -> set[str]:
-    """Return the tables, and the keys of [data], that the trials of a source do not depend on."""
-    return {*tables_without_effect(source), *(f"data.{key}" for key in keys_without_effect(source))}
 
 
 def _what_matters(case: ExperimentCase, inert: set[str]) -> str:

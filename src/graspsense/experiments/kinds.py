@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 from attrs import frozen
@@ -13,9 +13,6 @@ from graspsense.core.components.registry import Resource, installed
 from graspsense.core.values.errors import ComponentFailed
 from graspsense.core.values.json_values import json_text
 from graspsense.evaluation.json_codec import from_json, to_json
-
-TaskFunction = Callable[[Mapping[str, Any], int], Any]
-"""Takes the parameters and the seed of a task. Returns its result, which depends on these two alone."""
 
 
 @frozen
@@ -27,15 +24,9 @@ class TaskKind:
 
     declared: Resource[ExperimentKindEntry]
 
-    def function(self) -> TaskFunction:
-        """Return the function that runs a task."""
-        function: TaskFunction = self.declared.load("run")
-        return function
-
     def keys_class(self) -> type:
         """Return the class of the keys under `[judge]`."""
-        cls: type = self.declared.class_of_kind("keys")
-        return cls
+        return self.declared.class_of_kind("keys")
 
     def result_class(self) -> type:
         """Return the class of the result."""
@@ -43,8 +34,7 @@ class TaskKind:
             from graspsense.experiments.task_results import RecognitionResult
 
             return RecognitionResult
-        cls: type = self.declared.class_of_kind("result")
-        return cls
+        return self.declared.class_of_kind("result")
 
     def encoded(self, returned: Any) -> Any:
         """Return the JSON values of what `run` returned. Raises ComponentFailed if it cannot be read from them."""
@@ -66,10 +56,7 @@ class TaskKind:
 
     def findings(self) -> Callable[[Any], Any] | None:
         """Return the function that reports the findings, None if the rates are the whole report."""
-        if not self.declared.entry.findings:
-            return None
-        function: Callable[[Any], Any] = self.declared.load("findings")
-        return function
+        return self.declared.load("findings") if self.declared.entry.findings else None
 
 
 def kind_of(name: str) -> TaskKind:

@@ -170,18 +170,15 @@ def resolved(planned: Planned) -> str:
         plain(PipelineOf(name=name, pipeline=f"{PIPELINES}/{file_of(name)}")) for name in planned.pipelines
     ]
     if not planned.experiment.classifiers and planned.cases and not planned.parts:
+        # Those of the pipelines, unless the sweep changes them.
+        swept = any(key.split(".")[0] == "classifier" for key in planned.experiment.sweep)
+        varied = any(variant.classifier for variant in planned.experiment.variants)
+        learners = () if swept or varied else planned.cases[0].learners
         values["classifiers"] = [
-            {"name": case.name, "type": case.type, **case.config} for case in _unswept(planned)
+            {"name": learner.name, "type": learner.type, **learner.config} for learner in learners
         ]
     head = f"# {planned.name}, with everything filled in: `graspsense experiment FILE` gives the same again."
     return "\n".join([head, *toml_lines(values)]) + "\n"
-
-
-def _unswept(planned: Planned) -> list[Any]:
-    """Return the classifiers of the pipelines, unless the sweep changes them."""
-    swept = any(key.split(".")[0] == "classifier" for key in planned.experiment.sweep)
-    varied = any(variant.classifier for variant in planned.experiment.variants)
-    return [] if swept or varied else list(planned.cases[0].learners)
 
 
 def _write(path: Path, text: str) -> None:

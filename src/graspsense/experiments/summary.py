@@ -157,19 +157,6 @@ class Summary:
     cpu_seconds: float = 0.0
     """Total processor time of all tasks."""
 
-    def condition(
-        self, case: str = "", classifier: str | None = None, target: str | None = None
-    ) -> ConditionResult:
-        """Return the first condition of this case, and of this classifier and target if given. Raises KeyError."""
-        for condition in self.conditions:
-            if (
-                condition.case.name == case
-                and classifier in (None, condition.classifier)
-                and target in (None, condition.target)
-            ):
-                return condition
-        raise KeyError(f"no condition with case {case!r}, classifier {classifier!r}, target {target!r}")
-
     def recognition(self, case: str, seed: int) -> RecognitionResult | None:
         """Return the recognition result of this case and seed, None if there is none."""
         result = self.results.get((case, seed))

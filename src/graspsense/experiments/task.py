@@ -123,7 +123,7 @@ def run_task(text: str) -> str:
         with redirect_stdout(sys.stderr), command_line(taken=False):
             kind = kind_of(task.kind)
             # Encoded here, so that a value of a plugin that JSON cannot hold fails this task alone, and at once.
-            result = kind.encoded(kind.function()(task.params, task.seed))
+            result = kind.encoded(kind.declared.load("run")(task.params, task.seed))
         _refuse_other_inputs(task)
     except GraspsenseError as error:
         result, reason = None, str(error)

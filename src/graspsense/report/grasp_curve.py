@@ -57,11 +57,6 @@ class GraspCurve:
             if t is not None and value is not None and begin <= t <= end
         ]
 
-    @property
-    def time_words(self) -> str:
-        """The unit of time, in words."""
-        return "seconds" if self.time_unit == "s" else self.time_unit
-
 
 def grasp_curve(trace: Trace, label: str, trial: int) -> GraspCurve:
     """Return the curve of a trace."""

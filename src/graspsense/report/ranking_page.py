@@ -41,7 +41,9 @@ def ranking_table(ranking: Ranking) -> FoundTable:
             *(percent(candidate.rates[name].rate) if name in candidate.rates else "" for name in protocols),
             "" if candidate.loss is None else candidate.loss.points,
             candidate.standing,
-            _coverage(candidate),
+            ""
+            if candidate.sets is None or candidate.sets.covered is None
+            else percent(candidate.sets.covered.rate),
             f"{candidate.training_s:.2g} s",
         )
         for candidate in ranking.candidates
@@ -64,12 +66,6 @@ def ranking_table(ranking: Ranking) -> FoundTable:
 
 def _protocols(ranking: Ranking) -> list[str]:
     return list(dict.fromkeys(name for candidate in ranking.candidates for name in candidate.rates))
-
-
-def _coverage(candidate: Candidate) -> str:
-    """Return how many of the prediction sets contain the true label; empty if that was not measured."""
-    sets = candidate.sets
-    return "" if sets is None or sets.covered is None else percent(sets.covered.rate)
 
 
 def _rates(ranking: Ranking) -> str:

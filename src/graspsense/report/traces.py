@@ -49,7 +49,8 @@ def force_and_gap(
     With each curve that is drawn go arguments of `Picture.line`; without a name, force and gap are read out as such.
     """
     lines = list(drawn)
-    picture.x_axis(x, FORCE[1], GAP[0], f"{curves[0].time_words} since the squeeze began")
+    time = "seconds" if curves[0].time_unit == "s" else curves[0].time_unit
+    picture.x_axis(x, FORCE[1], GAP[0], f"{time} since the squeeze began")
     for column, what, unit, (bottom, top) in (
         ("force_n", curves[0].force, "N", FORCE),
         ("gap_mm", "gap", "mm", GAP),

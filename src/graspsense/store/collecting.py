@@ -142,7 +142,8 @@ class Collection:
         return next((name for name in newest_first if self.store.summary(name).set_aside is None), None)
 
     def _grasp(self, word: str) -> None:
-        settings = self.settings_for(word, self.wanted.seed + self._number_of_trials())
+        newest = self.store.page(set_aside=None, limit=1)
+        settings = self.settings_for(word, self.wanted.seed + (newest[0].id if newest else 0))
 
         def opened(device: DeviceInfo) -> None:
             check_label(settings, device)
@@ -198,10 +199,6 @@ class Collection:
         word = self.collected[last]
         self.say(f"trial {last}, {word}: set aside ({why})")
         return word
-
-    def _number_of_trials(self) -> int:
-        newest = self.store.page(set_aside=None, limit=1)
-        return newest[0].id if newest else 0
 
     def _check(self, check: Callable[[Store, StoredTrial, T], None], now: T) -> None:
         """Compare settings or gripper with those of the newest trial, if there is one and they may not differ."""

@@ -38,12 +38,14 @@ def check_settings(store: Store, stored: StoredTrial, settings: Settings) -> Non
     """
     now, then = recipe(without_none(settings.values)), stored.recipe
     differences = []
+    configs = {part.component.table: part.config for part in settings.chosen} | {"run": settings.run}
     for table in dict.fromkeys((*then, *now)):
         was, is_now = then.get(table, {}), now.get(table, {})
         if was.get("type") != is_now.get("type"):
             differences.append(_difference(f"{table}.type", was.get("type"), is_now.get("type")))
             continue
-        declared, passive = settings.keys(table), _passive(settings, table)
+        declared = settings.keys(table)
+        passive = settings_marked(type(configs[table]), CHANGES_NO_RESULT) if table in configs else ()
         for key in dict.fromkeys((*was, *is_now)):
             # A key that the trial does not have is newer than the trial, which was recorded with its default.
             default = without_none(declared[key]["default"]) if key in declared else None
@@ -64,12 +66,6 @@ def check_device(store: Store, stored: StoredTrial, device: DeviceInfo) -> None:
     ]
     if differences:
         raise ConfigError(_refusal("gripper", store, stored, differences))
-
-
-def _passive(settings: Settings, table: str) -> frozenset[str]:
-    """Return the keys of a table that change no result."""
-    configs = {part.component.table: part.config for part in settings.chosen} | {"run": settings.run}
-    return settings_marked(type(configs[table]), CHANGES_NO_RESULT) if table in configs else frozenset()
 
 
 def _difference(name: str, was: Any, is_now: Any) -> str:

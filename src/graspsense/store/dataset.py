@@ -105,7 +105,8 @@ def labelled_store(
     with Store.read(folder) as store:
         newest, feature_set = _newest(store, wanted)
         changed = (*options, *(flag.key for flag in flags), *(f"checkpoint {t:g} s" for t in checkpoints_s))
-        rows = _read_rows(store, wanted, None if changed else feature_set)
+        same_set = "" if changed else f" AND feature_set = {feature_set}"
+        rows = _Rows(**store.columns(_COLUMNS, wanted + same_set))
         target, notes = None, [] if changed else _of_recording(store, wanted, len(rows))
         rows = _intact(store, rows, notes)
         if value is not None:
@@ -120,7 +121,9 @@ def labelled_store(
             if target is not None:
                 known = dict(zip(asked, target.values, strict=True))
                 target = evolve(target, values=tuple(known[number] for number in rows.id))
-            settings, components = _with_gripper(extracted, settings, components)
+            # The gripper is the one that grasped, not the replay.
+            settings = {**recipe(extracted.settings), "gripper": settings.get("gripper", {})}
+            components = {**extracted.components, "gripper": components.get("gripper", "")}
         else:
             tables = _stored_tables(store, folder, rows, feature_set)
         known_controls = _controls(store, rows, tables)
@@ -178,16 +181,6 @@ def _provenance(
     }
 
 
-def _with_gripper(
-    extracted: ExtractedTrials, settings: Mapping[str, Any], components: Mapping[str, str]
-) -> tuple[dict[str, Any], dict[str, str]]:
-    """Return settings and components of trials that were extracted again; the gripper is the one that grasped."""
-    return (
-        {**recipe(extracted.settings), "gripper": settings.get("gripper", {})},
-        {**extracted.components, "gripper": components.get("gripper", "")},
-    )
-
-
 def _newest(store: Store, wanted: str) -> tuple[StoredTrial, int]:
     """Return the newest wanted trial that can be read, and the number of its feature set.
 
@@ -219,13 +212,6 @@ def _controls(store: Store, rows: _Rows, tables: _Tables) -> Controls:
         first_line=first_lines(store, rows.recording, rows.origin),
     )
     return without_constant_gap(known_controls, imported_gaps(store, rows.recording, rows.origin))
-
-
-def _read_rows(store: Store, wanted: str, feature_set: int | None) -> _Rows:
-    """Return the rows of the wanted trials, with `feature_set` only those that have it."""
-    if feature_set is None:
-        return _Rows(**store.columns(_COLUMNS, wanted))
-    return _Rows(**store.columns(_COLUMNS, f"{wanted} AND feature_set = ?", (feature_set,)))
 
 
 def _intact(store: Store, rows: _Rows, notes: list[str]) -> _Rows:

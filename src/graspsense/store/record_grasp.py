@@ -66,57 +66,47 @@ def record_grasp(
     """
     # The grasp itself ends at a signal; what comes before and after it does not.
     with Interrupts(deferred=True) as interrupts:
+        if beside is not None:
+            labels = {**labels, "beside": beside.other}
+        record = TrialRecord.begin(settings, labels, origin)
+        recorder = Recorder(store.new_recording(record.made_at) if beside is None else beside.recording)
 
         def opened(device: DeviceInfo) -> None:
+            nonlocal record
             if interrupts.count:
                 raise KeyboardInterrupt
             if on_open is not None:
                 on_open(device)
+            record = record.with_device(device)
+            recorder.metadata(DEVICE, record.section(DEVICE))
+            recorder.wait_ready()
 
-        record = TrialRecord.begin(
-            settings, labels if beside is None else {**labels, "beside": beside.other}, origin
-        )
-        recorder = Recorder(store.new_recording(record.made_at) if beside is None else beside.recording)
-
-        def grasped(on_open: Callable[[DeviceInfo], None]) -> Trial:
-            return grasp_with(
-                settings,
-                plugins,
-                labels=record.labels,
-                sinks=[*sinks, recorder],
-                on_open=on_open,
-                beside=None if beside is None else beside.member,
-            )
-
-        grasp = _recorded(store, record, recorder, opened, grasped)
-        return evolve(grasp, interrupted=grasp.interrupted or interrupts.count > 0)
-
-
-def _recorded(
-    store: Store,
-    record: TrialRecord,
-    recorder: Recorder,
-    on_open: Callable[[DeviceInfo], None],
-    grasped: Callable[[Callable[[DeviceInfo], None]], Trial],
-) -> RecordedTrial:
-    def opened(device: DeviceInfo) -> None:
-        nonlocal record
-        on_open(device)
-        record = record.with_device(device)
-        recorder.metadata(DEVICE, record.section(DEVICE))
-        recorder.wait_ready()
-
-    try:
-        recorder.metadata(START, record.section(START))
         interrupted = False
         try:
-            trial = grasped(opened)
-        except GraspInterrupted as error:
-            trial, interrupted = error.trial, True
-        record = record.with_result(trial)
-    except BaseException:
-        recorder.leave()
-        raise
+            recorder.metadata(START, record.section(START))
+            try:
+                trial = grasp_with(
+                    settings,
+                    plugins,
+                    labels=record.labels,
+                    sinks=[*sinks, recorder],
+                    on_open=opened,
+                    beside=None if beside is None else beside.member,
+                )
+            except GraspInterrupted as error:
+                trial, interrupted = error.trial, True
+            record = record.with_result(trial)
+        except BaseException:
+            recorder.leave()
+            raise
+        grasp = _saved(store, record, recorder, trial, interrupted)
+        return evolve(grasp, interrupted=interrupted or interrupts.count > 0)
+
+
+def _saved(
+    store: Store, record: TrialRecord, recorder: Recorder, trial: Trial, interrupted: bool
+) -> RecordedTrial:
+    """Add a grasp that is over to the store, or say why it cannot be."""
     try:
         missing = _missing(trial, recorder, interrupted)
         if missing:
@@ -126,8 +116,8 @@ def _recorded(
         complete = not recording.dropped and recording.ticks == recorder.ticks
         number = store.add(record, recording, complete=complete)
     except SaveFailed as error:
-        return RecordedTrial(trial=trial, number=None, counts={}, problem=str(error), interrupted=interrupted)
-    return RecordedTrial(trial=trial, number=number, counts=recording.counts, interrupted=interrupted)
+        return RecordedTrial(trial=trial, number=None, counts={}, problem=str(error))
+    return RecordedTrial(trial=trial, number=number, counts=recording.counts)
 
 
 def _missing(trial: Trial, recorder: Recorder, interrupted: bool) -> str:

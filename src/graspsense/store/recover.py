@@ -52,11 +52,9 @@ class Recovered:
 
     def as_json(self) -> dict[str, Any]:
         """Return the fields as JSON values."""
-        return {
-            **asdict(self),
-            "file": str(self.file),
-            "recording": None if self.recording is None else str(self.recording),
-        }
+        return asdict(
+            self, value_serializer=lambda _, field, value: str(value) if isinstance(value, Path) else value
+        )
 
 
 def recover_store(store: Store) -> list[Recovered]:

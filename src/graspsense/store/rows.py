@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
-from attrs import asdict, evolve, fields_dict, frozen
+from attrs import evolve, fields_dict, frozen
 
 from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.features import Features
@@ -72,10 +72,6 @@ class TrialSummary:
     device: str
     simulated: bool
     recording: str
-
-    def as_json(self) -> dict[str, Any]:
-        """Return the fields as JSON values."""
-        return asdict(self)
 
     @classmethod
     def from_row(cls, row: Sequence[Any]) -> TrialSummary:

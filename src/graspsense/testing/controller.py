@@ -17,7 +17,7 @@ from graspsense.core.compiling.call_graph import NotCompilable, fingerprint
 from graspsense.core.components.channels import can_change, further, no_signals, read_only
 from graspsense.core.components.entries import KINDS
 from graspsense.core.components.run_config import RunConfig
-from graspsense.core.control.free_motion import FreeMotion, free_motion_of
+from graspsense.core.control.free_motion import FreeMotion
 from graspsense.core.grasp.protection.effort_ceiling import MARGIN
 from graspsense.core.grasp.runner import run_uninterrupted
 from graspsense.core.values.channel import Channel
@@ -470,7 +470,8 @@ def events_are_declared(subject: Subject) -> None:
 def free_motion_is_step(subject: Subject) -> None:
     """A law of free motion commands what `step` commands, and ends in the same state, while no force changes."""
     law = subject.create()
-    motion, params = free_motion_of(type(law).step), law.params()
+    motion: FreeMotion | None = getattr(type(law).step, "free_motion", None)
+    params = law.params()
     if motion is None:
         return
     for function in (motion.begin, motion.command, motion.end):

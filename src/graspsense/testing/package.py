@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import importlib.util
 import json
 import os
@@ -22,7 +21,6 @@ from urllib.parse import unquote, urlparse
 import click
 
 from graspsense.core.components.entries import ConformanceCheckEntry, ExperimentKindEntry, PipelineEntry
-from graspsense.core.components.moved_names import new_form
 from graspsense.core.components.registry import SLOW_IMPORT_S, Resource
 from graspsense.core.pipeline.wiring import check as check_wiring
 from graspsense.core.settings.resolved import resolve
@@ -33,23 +31,18 @@ from graspsense.testing.samples import a_trial, an_event, contents_of
 from graspsense.testing.subject import Package, printed_afresh
 
 PROBE_S: Final = 1.0
-_MODULE: Final = "graspsense.plugin_api"
 OBSERVER_S: Final = 2.0
 _ADVICE_ON_OBSERVERS: Final = ": an observer that raises is passed over from then on; catch what may go wrong"
 
 
 def plugins_load(package: Package) -> None:
     """Every plugin of the distribution can be imported, is written for this API, and violates no rule."""
-    old = [line for path in _sources(package) for line in _old_imports(path)]
-    names = f"\n    {len(old)} names moved:\n    " + "\n    ".join(old) if old else ""
     for status in package.statuses:
         demand(
             status.state == "loaded",
             f"{status.entry_point} = {status.module} is {status.state}: {status.reason}"
-            + (f"\n    {ADVICE_ON_IMPORTS}" if "ModuleNotFoundError" in status.reason else "")
-            + names,
+            + (f"\n    {ADVICE_ON_IMPORTS}" if "ModuleNotFoundError" in status.reason else ""),
         )
-    demand(not old, f"it imports what is elsewhere now{names}")
 
 
 def plugin_modules_are_light(package: Package) -> None:
@@ -215,45 +208,6 @@ def _places(top: str) -> list[Path]:
     """Return the folders of a package, or the file of a module; nothing for one that is not there."""
     spec = importlib.util.find_spec(top)
     return [] if spec is None else [*map(Path, spec.submodule_search_locations or [str(spec.origin)])]
-
-
-def _sources(package: Package) -> Iterator[Path]:
-    """Yield the Python files of a distribution; of an editable one also those beside its package, as its tests."""
-    folder = _editable_folder(package.distribution)
-    tops = {module.partition(".")[0] for module in _modules_of(package)} - {"graspsense"}
-    places = [place for top in sorted(tops) for place in _places(top)]
-    for place in [folder] if folder is not None and tops else places:
-        for path in [place] if place.is_file() else sorted(place.rglob("*.py")):
-            inside = path.relative_to(place).parts
-            if "site-packages" not in inside and not any(part.startswith(".") for part in inside):
-                yield path
-
-
-def _old_imports(path: Path) -> Iterator[str]:
-    """Yield each use of a moved name in a source file: its place, the old form, and the new form beside it."""
-    try:
-        tree = ast.parse(path.read_bytes())
-    except SyntaxError:
-        return
-    for line, name, old in sorted(_uses(tree)):
-        if replacement := new_form(name):
-            yield f"{path}:{line}: {old} -> {replacement}"
-
-
-def _uses(tree: ast.Module) -> Iterator[tuple[int, str, str]]:
-    """Yield line, name and text of everything that is taken from the module."""
-    called = {_MODULE}
-    for node in ast.walk(tree):
-        if isinstance(node, ast.ImportFrom) and node.module == _MODULE:
-            for alias in node.names:
-                yield alias.lineno, alias.name, f"from {_MODULE} import {alias.name}"
-        elif isinstance(node, ast.ImportFrom) and node.module == "graspsense":
-            called |= {alias.asname or alias.name for alias in node.names if alias.name == "plugin_api"}
-        elif isinstance(node, ast.Import):
-            called |= {alias.asname for alias in node.names if alias.name == _MODULE and alias.asname}
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Attribute) and ast.unparse(node.value) in called:
-            yield node.lineno, node.attr, ast.unparse(node)
 
 
 def _files_of(top: str) -> list[str]:

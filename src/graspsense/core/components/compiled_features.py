@@ -101,7 +101,21 @@ def compiled_extraction(extract: Callable[[Trace], Any] | None) -> CompiledExtra
     if own is not None:
         extraction: CompiledExtraction | None = own()
         return extraction
-    return _of_method(extract) if isinstance(extract, MethodType) else None
+    if not isinstance(extract, MethodType):
+        return None
+    # The mark is on the function, so that none applies to a subclass or a test that replaces `extract`.
+    form: CompiledFeatures | None = getattr(extract.__func__, "compiled", None)
+    if form is None:
+        return None
+    # Imported here, since the declarations of a feature set are read without numpy.
+    from graspsense.core.values.trace import SI_UNITS
+
+    feature_set = extract.__self__
+
+    def result(measured: Numbers) -> Features:
+        return form.features(feature_set, measured, SI_UNITS)
+
+    return CompiledExtraction(form.measure, form.params(feature_set), result, form.reads_release)
 
 
 def columns_of_ticks(trace: Trace) -> TickColumns:
@@ -137,19 +151,3 @@ measure_other: Callable[[Any, TickColumns], Numbers] = _nothing
 
 def _measure_both(params: Any, ticks: TickColumns) -> Numbers:
     return measure_one(params[0], ticks), measure_other(params[1], ticks)
-
-
-def _of_method(extract: MethodType) -> CompiledExtraction | None:
-    # The mark is on the function, so that none applies to a subclass or a test that replaces `extract`.
-    form: CompiledFeatures | None = getattr(extract.__func__, "compiled", None)
-    if form is None:
-        return None
-    # Imported here, since the declarations of a feature set are read without numpy.
-    from graspsense.core.values.trace import SI_UNITS
-
-    feature_set = extract.__self__
-
-    def result(measured: Numbers) -> Features:
-        return form.features(feature_set, measured, SI_UNITS)
-
-    return CompiledExtraction(form.measure, form.params(feature_set), result, form.reads_release)

@@ -19,12 +19,11 @@ from attrs.validators import and_, deep_iterable, ge, in_, instance_of, optional
 
 from graspsense.core.values.channel import IS_NAME, Channel
 from graspsense.core.values.errors import suggestion
-from graspsense.core.values.signals import CommandKind
 
 Role = Literal["sensor-backend", "controller", "feature-set", "classifier"]
 
-KINDS: Final = tuple(kind.name.lower() for kind in CommandKind)
-"""The kinds of command as entries name them: effort, velocity, position, force."""
+KINDS: Final = ("effort", "velocity", "position", "force")
+"""The kinds of command as entries name them, each at the place of its number (`EFFORT` and so on)."""
 
 
 def _known_kinds(entry: object, attribute: Attribute[Any], kinds: tuple[str, ...]) -> None:

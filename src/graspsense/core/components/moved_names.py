@@ -33,18 +33,12 @@ REPLACED: Final = {
 """Name that was public to what is used in its place."""
 
 
-def new_form(name: str) -> str:
-    """Return what replaces the import of a name from `graspsense.plugin_api`; empty if it never had this name."""
-    if name in REPLACED:
-        return REPLACED[name]
+def refuse_moved(name: str) -> None:
+    """Raise an ImportError that says where a name of `graspsense.plugin_api` is now; do nothing for other names."""
+    instead = REPLACED.get(name, "")
     for module in SPECIAL:
         names = import_module(f"graspsense.{module}").PUBLIC.names
         if name in (MOVED_TO_EXPERIMENTS if module == "experiment_api" else names):
-            return f"from graspsense.{module} import {name}"
-    return ""
-
-
-def refuse_moved(name: str) -> None:
-    """Raise an ImportError that says where a name of `graspsense.plugin_api` is now; do nothing for other names."""
-    if replacement := new_form(name):
-        raise ImportError(f"graspsense.plugin_api no longer has {name}; in its place: {replacement}")
+            instead = instead or f"from graspsense.{module} import {name}"
+    if instead:
+        raise ImportError(f"graspsense.plugin_api no longer has {name}; in its place: {instead}")

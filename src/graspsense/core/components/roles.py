@@ -315,9 +315,6 @@ class ControllerState(Protocol):
         """`RUNNING` until the controller ends the grasp, then the number of an `Outcome`."""
 
 
-StepLaw = Callable[[Any, Any, Reading], tuple[Command, Any]]
-
-
 def _copy(function: FunctionType) -> FunctionType:
     same = FunctionType(
         function.__code__,

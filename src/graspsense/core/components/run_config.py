@@ -99,7 +99,3 @@ class RunConfig:
         meaning='Where frames of the gripper are, kept with each trial: `tool = "tool0 of arm.urdf"`, '
         '`thumb = "0 20 95 mm, 0 0 90 deg in tool"`.',
     )
-
-    def mountings(self) -> dict[str, Mounting]:
-        """Return where the frames of `mounting` are."""
-        return {name: Mounting.parse(text) for name, text in self.mounting.items()}

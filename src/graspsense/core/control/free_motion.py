@@ -47,12 +47,3 @@ class FreeMotion:
     end: Callable[[Any, Any, Any, float, float], Any]
     """`end(params, state, memory, effort_n, t_s) -> state`: the state after the last of these ticks, given that of
     `begin`, the memory and the effort after the last tick, and its time."""
-
-
-def free_motion_of(step: Callable[..., Any]) -> FreeMotion | None:
-    """Return the law of free motion that was declared together with this step; None if there is none.
-
-    A subclass that replaces `step` has to declare its own law, so that none is used for another step.
-    """
-    law: FreeMotion | None = getattr(step, "free_motion", None)
-    return law

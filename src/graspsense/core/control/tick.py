@@ -15,7 +15,7 @@ from math import inf, nan
 from typing import Any, NamedTuple
 
 from graspsense.core.control.contact import RestState, at_rest, update_rest
-from graspsense.core.control.free_motion import NOT_FREE, FreeLimits, free_motion_of
+from graspsense.core.control.free_motion import NOT_FREE, FreeLimits, FreeMotion
 from graspsense.core.control.guard import GuardParams, GuardState, guard, limits_without_contact
 from graspsense.core.values.signals import (
     EFFORT,
@@ -240,7 +240,8 @@ free_end: Callable[[Any, Any, Any, float, float], Any] = _unchanged
 
 def free_parts(step: Callable[..., Any]) -> dict[str, Any]:
     """Return the parts of `free_from`, `free_tick` and `after_free` for a controller with this step."""
-    law = free_motion_of(step)
+    # A subclass that replaces `step` has to declare its own law, so that none is used for another step.
+    law: FreeMotion | None = getattr(step, "free_motion", None)
     if law is None:
         return {}
     return {"free_begin": law.begin, "free_command": law.command, "free_end": law.end}

@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import re
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from difflib import get_close_matches
 from importlib.resources.abc import Traversable
 from itertools import count
@@ -177,9 +177,9 @@ class _Scanner:
             else:
                 self.pair(table)
 
-    def next_token(self) -> str:
-        """Return the next token that is not the end of a line, and stay before it; empty at the end."""
-        while self.tokens and self.tokens[-1][0] == "\n":
+    def next_token(self, passed: str = "\n") -> str:
+        """Return the next token that is none of these signs, and stay before it; empty at the end."""
+        while self.tokens and self.tokens[-1][0] in passed:
             self.tokens.pop()
         return self.tokens[-1][0] if self.tokens else ""
 
@@ -211,26 +211,19 @@ class _Scanner:
 
     def value(self, path: KeyPath) -> None:
         token, _ = self.tokens.pop()
-        if token == "[":
-            for index in self.members("]"):
-                self.lines[*path, index] = self.tokens[-1][1]
-                self.value((*path, index))
-        elif token == "{":
-            for _ in self.members("}"):
-                self.pair(path)
+        if token in ("[", "{"):
+            for index in count():
+                if self.next_token(",\n") in ("]", "}"):
+                    self.tokens.pop()
+                    break
+                if token == "[":
+                    self.lines[*path, index] = self.tokens[-1][1]
+                    self.value((*path, index))
+                else:
+                    self.pair(path)
         # A date may have a space before its time.
         while self.tokens and self.tokens[-1][0] not in ("\n", ",", "]", "}"):
             self.tokens.pop()
-
-    def members(self, end: str) -> Iterator[int]:
-        """Yield the number of each member of a list or a table, which is to be taken; take its end too."""
-        for number in count():
-            while (token := self.next_token()) == ",":
-                self.tokens.pop()
-            if token == end:
-                self.tokens.pop()
-                return
-            yield number
 
     def key(self, end: str) -> list[str]:
         """Take the parts of a dotted key, and the sign behind it."""

@@ -17,7 +17,8 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
 
-from attrs import frozen
+from attrs import asdict, fields_dict, frozen
+from attrs.filters import exclude
 
 from graspsense.core.components.caller import set_option
 from graspsense.core.files.user_folders import NOWHERE, data_folder, make_closed, why_open
@@ -52,10 +53,6 @@ class Calibration:
     sha256: str = ""
 
 
-_STORED: Final = ("kind", "serial", "device", "made", "data")
-"""The fields in the file, beside its format, version and hash."""
-
-
 def calibration_path(folder: str | Path, serial: str, kind: str) -> Path:
     """Return the path of a calibration of this kind and serial number; an empty folder means that of the user.
 
@@ -81,12 +78,9 @@ def calibration_folder(given: str | Path) -> Path | None:
 
 def write_calibration(path: Path, calibration: Calibration) -> Calibration:
     """Write the file atomically, and return the calibration with its hash. Raises OSError."""
-    said = {name: getattr(calibration, name) for name in _STORED}
-    tables = {"device": dict(calibration.device), "data": dict(calibration.data)}
-    content = {"format": FORMAT, "version": VERSION, **said, **tables}
-    sha256 = _hash(content)
+    content = {"format": FORMAT, "version": VERSION, **asdict(calibration, filter=exclude("sha256"))}
     make_closed(path.parent)
-    write_whole(path, json.dumps({**content, "sha256": sha256}, indent=1).encode(), mode=0o644)
+    write_whole(path, json.dumps({**content, "sha256": _hash(content)}, indent=1).encode(), mode=0o644)
     return read_calibration(path)
 
 
@@ -120,7 +114,8 @@ def read_calibration(path: Path) -> Calibration:
             "file as it was"
         )
     try:
-        calibration = Calibration(**{name: content[name] for name in _STORED}, sha256=sha256)
+        stored = {**content, "sha256": sha256}
+        calibration = Calibration(**{name: stored[name] for name in fields_dict(Calibration)})
         datetime.fromisoformat(calibration.made)
         _READERS[calibration.kind](calibration)
     except (KeyError, TypeError, ValueError) as error:

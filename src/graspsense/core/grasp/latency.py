@@ -13,12 +13,12 @@ from typing import Any, Final, NamedTuple
 
 from attrs import evolve
 
-from graspsense.core.components.entries import Finding
+from graspsense.core.components.entries import KINDS, Finding
 from graspsense.core.components.roles import SensorBackend
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.calibrating import CalibrationFailed, Rig
 from graspsense.core.values.device import DeviceInfo
-from graspsense.core.values.signals import EFFORT, FORCE, POSITION, VELOCITY, Command, CommandKind, Frame
+from graspsense.core.values.signals import EFFORT, FORCE, POSITION, VELOCITY, Command, Frame
 
 QUIET_S: Final = 0.2
 """Time without a change of the command, from which the noise of gap and force is known."""
@@ -109,7 +109,7 @@ class _Meter:
         lightest_n = max(backend.least_force_n, 0.0)
         # As little as moves the fingers, so that there is more to ask for on what they meet.
         self._light_n = [max(share * self._most_n, lightest_n) for share in SHARES]
-        kinds = [CommandKind[name.upper()] for name in accepts]
+        kinds = [KINDS.index(name) for name in accepts]
         self._kind = next(kind for kind in (VELOCITY, POSITION, EFFORT, FORCE) if kind in kinds)
 
     def motion_s(self) -> float:

@@ -12,6 +12,7 @@ from graspsense.core.values.channel import Channel
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import ComponentFailed, DeviceLost, GraspsenseError, named, place_of
 from graspsense.core.values.fingers import fingers_in_words, fingers_of
+from graspsense.core.values.mounting import Mounting
 
 
 def opened_gripper(backend: SensorBackend[Any], seed: int) -> DeviceInfo:
@@ -44,7 +45,7 @@ def described(
         info,
         channels=channels,
         notes=(*info.notes, *(note for note in further if note not in info.notes)),
-        mounting={**info.mounting, **run.mountings()},
+        mounting={**info.mounting, **{name: Mounting.parse(text) for name, text in run.mounting.items()}},
     )
 
 

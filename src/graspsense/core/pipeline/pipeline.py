@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from attrs import evolve, frozen
+from attrs import asdict, evolve, frozen
+from attrs.filters import exclude
 
 from graspsense.core.components.caller import set_option
 from graspsense.core.components.registry import Component, Plugins, installed
@@ -212,15 +213,20 @@ def grasp_with(
         backend = beside.gripper(backend)
     controller, feature_set = settings.controller.create(), settings.features.create()
     anytime = anytime_of(model, feature_set, settings)
-    run = _run_info(settings, labels)
+    run = RunInfo(
+        components=settings.components,
+        settings=settings.values,
+        seed=settings.run.seed,
+        labels=dict(labels or {}),
+    )
 
     def tell(event: GraspEvent) -> None:
-        plugins.grasp_event(run, event)
+        plugins.collect("graspsense_grasp_event", run=run, event=event)
         if on_event is not None:
             on_event(event)
 
     backend.expect_features(feature_set)
-    plugins.run_starting(run)
+    plugins.collect("graspsense_run_starting", run=run)
     grasp = _grasped(settings, backend, controller, anytime, sinks, tell, on_open)
     checkpoints = () if anytime is None else tuple(anytime.predictions)
     prediction: Prediction | None
@@ -232,21 +238,12 @@ def grasp_with(
     prediction, checkpoints = _as_certain_as_the_gripper(grasp, prediction, checkpoints)
     trial = Trial(
         run=run,
-        trace=grasp.trace,
-        outcome=grasp.outcome,
-        reason=grasp.reason,
         features=features,
         prediction=prediction,
-        device=grasp.device,
-        report=grasp.report,
-        counts=grasp.counts,
-        events=grasp.events,
-        seconds_simulated=grasp.seconds_simulated,
-        seconds_wall=grasp.seconds_wall,
         checkpoints=checkpoints,
-        warnings=grasp.warnings,
+        **asdict(grasp, recurse=False, filter=exclude("interrupted")),
     )
-    plugins.run_finished(run, trial)
+    plugins.collect("graspsense_run_finished", run=run, trial=trial)
     if grasp.interrupted:
         raise GraspInterrupted(trial)
     return trial
@@ -265,15 +262,6 @@ def _as_certain_as_the_gripper(
     return (
         None if prediction is None else prediction.without_certainty(why),
         tuple(evolve(early, prediction=early.prediction.without_certainty(why)) for early in checkpoints),
-    )
-
-
-def _run_info(settings: Settings, labels: Mapping[str, str] | None) -> RunInfo:
-    return RunInfo(
-        components=settings.components,
-        settings=settings.values,
-        seed=settings.run.seed,
-        labels=dict(labels or {}),
     )
 
 

@@ -6,11 +6,11 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from typing import Any
 
-from attrs import asdict, frozen
+from attrs import asdict
 
 from graspsense.core.components.caller import option, set_option
 from graspsense.core.components.channels import declared_dtype, declared_shape
-from graspsense.core.components.entries import PipelineEntry, Role
+from graspsense.core.components.entries import PipelineEntry
 from graspsense.core.components.registry import Component, installed
 from graspsense.core.components.roles import FeatureSet
 from graspsense.core.settings.layers import read_toml
@@ -45,7 +45,7 @@ def check_recording(
     Raises WiringError that names each one that it lacks, and the arrays that it has with the options that choose them.
     """
     given = {channel.name: channel for channel in channels}
-    misfits = [misfit for user in users for misfit in _misfits_of(_user(user), given, "this recording")]
+    misfits = [misfit for user in users for misfit in _misfits_of(user, given, "this recording")]
     if misfits:
         raise WiringError(f"{source}: {'; '.join(misfits)}")
 
@@ -144,55 +144,40 @@ def _choices(gripper: SelectedComponent, user: SelectedComponent) -> list[str]:
     return [kind for kind in kinds if kind in gripper.declared.accepts]
 
 
-@frozen
-class _User:
-    """A component that needs channels."""
-
-    name: str
-    table: str
-    role: Role
-    requires: tuple[Channel, ...]
-    config: Any
-
-
-def _user(part: SelectedComponent | FeatureSet[Any]) -> _User:
-    if isinstance(part, FeatureSet):
-        requires = getattr(part, "requires", ())  # a set whose entry declares them has none of its own
-        return _User(f"features {type(part).__name__}", "features", "feature-set", requires, part.config)
-    component = part.component
-    return _User(_named(component), component.table, component.role, part.declared.requires, part.config)
-
-
 def _channel_misfits(gripper: SelectedComponent, user: SelectedComponent) -> Iterator[str]:
     given = {channel.name: channel for channel in gripper.declared.channels}
     hint = ""
     if gripper.component.channels_vary():
         hint = f" with these settings of [{gripper.component.table}]"
-    yield from _misfits_of(_user(user), given, _named(gripper.component), hint)
+    yield from _misfits_of(user, given, _named(gripper.component), hint)
 
 
-def _misfits_of(user: _User, given: Mapping[str, Channel], provider: str, hint: str = "") -> Iterator[str]:
-    for wanted in user.requires:
-        needs, have = f"{user.name} needs the channel {_described(wanted)}", given.get(wanted.name)
+def _misfits_of(
+    user: SelectedComponent | FeatureSet[Any], given: Mapping[str, Channel], provider: str, hint: str = ""
+) -> Iterator[str]:
+    if isinstance(user, FeatureSet):
+        table, name = "features", f"features {type(user).__name__}"
+        requires = getattr(user, "requires", ())  # a set whose entry declares them has none of its own
+    else:
+        table, name, requires = user.component.table, _named(user.component), user.declared.requires
+    for wanted in requires:
+        needs, have = f"{name} needs the channel {_described(wanted)}", given.get(wanted.name)
+        arrays = _arrays(table, user.config, wanted, given)
         if have is None:
-            there = f"(it has: {', '.join(given) or 'none'})"
-            yield f"{needs}, which {provider} does not have{hint} {there}{_arrays(user, wanted, given)}"
+            yield f"{needs}, which {provider} does not have{hint} (it has: {', '.join(given) or 'none'}){arrays}"
         elif have.unit != wanted.unit:
-            yield f"{needs}, but {provider} gives it in {have.unit}{_arrays(user, wanted, given)}"
-        elif not _fits(wanted, have, user.role):
-            layouts = f"as {_layout(wanted)}, but {provider} gives it as {_layout(have)}"
-            yield f"{needs} {layouts}{_arrays(user, wanted, given)}"
+            yield f"{needs}, but {provider} gives it in {have.unit}{arrays}"
+        elif not _fits(wanted, have, table):
+            yield f"{needs} as {_layout(wanted)}, but {provider} gives it as {_layout(have)}{arrays}"
         elif have.rate_hz < wanted.rate_hz:
             rate = f"at {have.rate_hz:g} Hz" if have.rate_hz else "at no promised rate"
             yield f"{needs}, but {provider} gives it {rate}"
 
 
-def _arrays(user: _User, wanted: Channel, given: Mapping[str, Channel]) -> str:
+def _arrays(table: str, config: Any, wanted: Channel, given: Mapping[str, Channel]) -> str:
     """Return the options that choose an array that there is, for a component whose settings name its array."""
     named = [
-        key
-        for key, value in asdict(user.config).items()
-        if wanted.name in map(str.strip, str(value).split(","))
+        key for key, value in asdict(config).items() if wanted.name in map(str.strip, str(value).split(","))
     ]
     words = ""
     for channel in given.values():
@@ -202,15 +187,15 @@ def _arrays(user: _User, wanted: Channel, given: Mapping[str, Channel]) -> str:
                 "columns": channel.columns or channel.cells, "components": channel.components, "dtype": channel.dtype,
             }  # fmt: skip
             changed = [
-                f"{user.table}.{key}={value}"
+                f"{table}.{key}={value}"
                 for key, value in layout.items()
-                if getattr(user.config, key, value) != value
+                if getattr(config, key, value) != value
             ]
             words += f". For its array {channel.name}: {set_option(*changed)}"
     return words
 
 
-def _fits(wanted: Channel, have: Channel, role: Role) -> bool:
+def _fits(wanted: Channel, have: Channel, table: str) -> bool:
     """Return whether a channel has the kind and the shape that is wanted, so that the same code reads it.
 
     Features read the samples of a fast channel, not how many come in a tick.
@@ -219,7 +204,7 @@ def _fits(wanted: Channel, have: Channel, role: Role) -> bool:
         return True  # the images of fingertips of any size
     if type(have) is not type(wanted) and not (type(wanted) is Channel and isinstance(have, FingerForce)):
         return False
-    if role == "feature-set" and isinstance(wanted, FastChannel):
+    if table == "features" and isinstance(wanted, FastChannel):
         return declared_shape(have)[1:] == declared_shape(wanted)[1:]
     return (declared_shape(have), declared_dtype(have)) == (declared_shape(wanted), declared_dtype(wanted))
 

@@ -12,6 +12,7 @@ from attrs import evolve, field, frozen
 
 from graspsense.core.values.display import html
 from graspsense.core.values.errors import listed
+from graspsense.core.values.json_values import json_ready
 from graspsense.core.values.printable import in_one_line
 from graspsense.core.values.reasons import Reason
 from graspsense.core.values.units import quantity
@@ -194,10 +195,6 @@ def table_of(rows: Iterable[Features]) -> FeatureTable:
     return collected.table()
 
 
-def _texts(items: Iterable[str]) -> tuple[str, ...]:
-    return tuple(items)
-
-
 def _reasons(items: Iterable[Reason | str]) -> tuple[Reason, ...]:
     return tuple(item if isinstance(item, Reason) else Reason(words=item) for item in items)
 
@@ -225,10 +222,10 @@ class Prediction:
     label: str
     probabilities: Mapping[str, float]
     because: tuple[Reason, ...] = field(converter=_reasons)
-    warnings: tuple[str, ...] = field(default=(), converter=_texts)
+    warnings: tuple[str, ...] = field(default=(), converter=tuple[str, ...])
     model: str = ""
     support: tuple[float, float] | None = None
-    prediction_set: tuple[str, ...] = field(default=(), converter=_texts)
+    prediction_set: tuple[str, ...] = field(default=(), converter=tuple[str, ...])
     coverage: float | None = None
     calibrated: bool = False
     no_certainty: str = ""
@@ -304,19 +301,20 @@ class Prediction:
 
     def as_json(self) -> dict[str, Any]:
         """Return label, probabilities, set and reasons as `--json` prints them."""
-        return {
-            "label": self.label,
-            "probabilities": dict(self.probabilities),
-            "support": None if self.support is None else list(self.support),
-            "prediction_set": list(self.prediction_set),
-            "coverage": self.coverage,
-            "certainty": self.certainty,
-            "certainty_interval": None if self.certainty_interval is None else list(self.certainty_interval),
-            "calibrated": self.calibrated,
-            "holds_for": self.holds_for,
-            "no_certainty": self.no_certainty,
-            "because": [reason.as_json() for reason in self.because],
-        }
+        names = (
+            "label",
+            "probabilities",
+            "support",
+            "prediction_set",
+            "coverage",
+            "certainty",
+            "certainty_interval",
+        )
+        values = {name: getattr(self, name) for name in (*names, "calibrated", "holds_for", "no_certainty")}
+        shown: dict[str, Any] = json_ready(
+            {**values, "because": [reason.as_json() for reason in self.because]}
+        )
+        return shown
 
     def __repr__(self) -> str:
         certainty = f", {self.certainty_in_words}" if self.certainty_in_words else ""

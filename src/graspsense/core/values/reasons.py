@@ -11,7 +11,7 @@ import math
 from collections.abc import Sequence
 from typing import Any, Final, Literal
 
-from attrs import frozen
+from attrs import asdict, frozen
 
 from graspsense.core.values.units import in_words
 
@@ -88,20 +88,13 @@ class Reason:
 
     def as_json(self) -> dict[str, Any]:
         """Return the reason as `--json` prints it: the words, and what else it has."""
-        result: dict[str, Any] = {"words": self.words}
-        if self.features:
-            result["features"] = [
-                {"name": feature.name, "value": feature.value, "unit": feature.unit}
-                for feature in self.features
-            ]
-        if self.above is not None or self.up_to is not None:
-            result["rule"] = {"above": self.above, "up_to": self.up_to}
-        if self.contribution is not None:
-            given = self.contribution
-            result["contribution"] = {"value": given.value, "scale": given.scale, "label": given.label}
-            if given.against:
-                result["contribution"]["against"] = given.against
-        return result
+        given, has_rule = self.contribution, self.above is not None or self.up_to is not None
+        parts = {
+            "features": [asdict(feature) for feature in self.features],
+            "rule": {"above": self.above, "up_to": self.up_to} if has_rule else None,
+            "contribution": given and asdict(given, filter=lambda _, value: value != ""),
+        }
+        return {"words": self.words, **{name: part for name, part in parts.items() if part}}
 
 
 def missing_feature(name: str, unit: str, words: str) -> Reason:

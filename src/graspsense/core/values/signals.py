@@ -135,15 +135,6 @@ class Command(NamedTuple):
     speed_limit_m_s: float
 
 
-class CommandKind(enum.IntEnum):
-    """The kinds of `Command`."""
-
-    EFFORT = 0
-    VELOCITY = 1
-    POSITION = 2
-    FORCE = 3
-
-
 class Phase(enum.IntEnum):
     """The phase of a grasp. A controller reports APPROACH, SQUEEZE and HOLD; the runner sets the others."""
 

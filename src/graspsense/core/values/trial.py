@@ -99,11 +99,7 @@ def trial_as_json(trial: Trial) -> dict[str, Any]:
         "seed": trial.run.seed,
         "labels": dict(trial.run.labels),
         "device": {
-            "name": device.name,
-            "serial": device.serial,
-            "firmware": device.firmware,
-            "clock": device.clock,
-            "rate_hz": device.rate_hz,
+            **{name: getattr(device, name) for name in ("name", "serial", "firmware", "clock", "rate_hz")},
             "calibration": dict(device.calibration),
             "notes": list(device.notes),
             "mounting": {name: mounting.as_json() for name, mounting in device.mounting.items()},

@@ -10,7 +10,7 @@ import contextlib
 import logging
 import sys
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator
 from typing import Any, Final, NamedTuple, cast
 
 import attrs
@@ -58,9 +58,8 @@ class HookCalls:
         self.plugin, self.name = plugin, f"{source.distribution}:{source.entry_point}"
         self._manager = pluggy.PluginManager(hookspecs.PROJECT)
         self._manager.add_hookspecs(hookspecs)
+        self._trace = trace
         self._warned: set[str] = set()
-        if trace:
-            self._trace_calls()
         try:
             self._manager.register(plugin, name=self.name)
         except pluggy.PluginValidationError as error:
@@ -69,7 +68,16 @@ class HookCalls:
 
     def call(self, hook: str, **arguments: Any) -> list[Any]:
         """Call an implementation; return its result in a list, or an empty list for None."""
-        return cast("list[Any]", getattr(self._manager.hook, hook)(**arguments))
+        began, ended = time.perf_counter(), "raised"
+        try:
+            results = cast("list[Any]", getattr(self._manager.hook, hook)(**arguments))
+            ended = "returned"
+            return results
+        finally:
+            if self._trace:
+                took_ms = (time.perf_counter() - began) * 1e3
+                line = f"hook {hook}({', '.join(arguments)}) of {self.name} {ended} in {took_ms:.2f} ms"
+                print(printable(line), file=sys.stderr)  # noqa: T201 (the user asked for it, on stderr)
 
     def entries(self, hook: str, kind: type, **arguments: Any) -> list[Any]:
         """Return the entries that a hook gives. Raises PluginRefused unless all are of `kind`."""
@@ -131,26 +139,6 @@ class HookCalls:
                     f"{name} is not marked with @hookimpl, so it would never be called: write @hookimpl above it"
                 )
         return tuple(sorted(names))
-
-    def _trace_calls(self) -> None:
-        started: list[float] = []
-
-        def started_call(hook: str, implementations: Sequence[Any], arguments: Mapping[str, Any]) -> None:
-            started.append(time.perf_counter())
-
-        def ended_call(
-            outcome: pluggy.Result[Any],
-            hook: str,
-            implementations: Sequence[Any],
-            arguments: Mapping[str, Any],
-        ) -> None:
-            took_ms = (time.perf_counter() - started.pop()) * 1e3
-            names = ", ".join(implementation.plugin_name for implementation in implementations)
-            ended = f"raised {error_text(outcome.exception)}" if outcome.exception else "returned"
-            line = f"hook {hook}({', '.join(arguments)}) of {names} {ended} in {took_ms:.2f} ms"
-            print(printable(line), file=sys.stderr)  # noqa: T201 (the user asked for it, on stderr)
-
-        self._manager.add_hookcall_monitoring(started_call, ended_call)
 
 
 class ImportCost(NamedTuple):

@@ -309,7 +309,7 @@ class Resource(Declared[EntryT]):
             )
         return made
 
-    def class_of_kind(self, part: str) -> Any:
+    def class_of_kind(self, part: str) -> type:
         """Import and return the class that a kind of experiment names as its `keys` or its `result`.
 
         Raises PluginUnavailable if it cannot be imported, ComponentFailed if values of it can be neither read nor

@@ -13,7 +13,7 @@ import traceback
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from importlib.metadata import distributions
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar
+from typing import Any, Final, Literal, TypeVar
 
 from attrs import evolve
 
@@ -59,10 +59,6 @@ from graspsense.core.components.registry.parts import (
     canonical,
 )
 from graspsense.core.values.errors import FAILURES, PluginUnavailable, UnknownName, place_of, suggestion
-
-if TYPE_CHECKING:
-    from graspsense.core.values.signals import GraspEvent
-    from graspsense.core.values.trial import RunInfo, Trial
 
 STRICT_VARIABLE: Final = "GRASPSENSE_STRICT_PLUGINS"
 """If this environment variable is 1, the error of a plugin that cannot be loaded is raised."""
@@ -195,23 +191,11 @@ class Plugins:
                 answers.append(HookAnswer(status.distribution, error=error_text(error)))
         return tuple(answers)
 
-    def run_starting(self, run: RunInfo) -> None:
-        """Notify the observers that a grasp is about to start."""
-        self._notify("graspsense_run_starting", run=run)
-
-    def grasp_event(self, run: RunInfo, event: GraspEvent) -> None:
-        """Notify the observers of a change of phase, or of an action of the guard."""
-        self._notify("graspsense_grasp_event", run=run, event=event)
-
-    def run_finished(self, run: RunInfo, trial: Trial) -> None:
-        """Notify the observers of the finished trial."""
-        self._notify("graspsense_run_finished", run=run, trial=trial)
-
     def collect(self, hook: str, /, **arguments: Any) -> tuple[tuple[str, Any], ...]:
-        """Call a hook that a plugin owns; return (distribution, result) for each plugin that implements it.
+        """Call a hook in every plugin that implements it; return (distribution, result) for each result.
 
-        The owner documents the hook; others implement it with `@hookimpl(optionalhook=True)`. A plugin whose
-        implementation raises is left out with a warning.
+        A hook that a plugin owns is documented by it; others implement it with `@hookimpl(optionalhook=True)`. A plugin
+        whose implementation raises is left out with a warning.
         """
         results: list[tuple[str, Any]] = []
         for status, calls in self._implementing(hook):
@@ -281,11 +265,6 @@ class Plugins:
 
     def _implementing(self, hook: str) -> Iterator[tuple[PluginStatus, HookCalls]]:
         return ((status, calls) for status, calls in self._loaded if hook in calls.hooks)
-
-    def _notify(self, hook: str, **arguments: Any) -> None:
-        for status, calls in self._implementing(hook):
-            with calls.isolated(status, hook):
-                calls.call(hook, **arguments)
 
     def _only(
         self,
