@@ -83,7 +83,7 @@ def run(kernel: Path, initrd: Path, share: Path, timeout_s: float) -> int:
     command = [
         # Time there goes by instructions, 2 ns each: a load on this machine makes it last longer and changes nothing
         # else.
-        "qemu-system-x86_64", "-M", "pc", "-accel", "tcg", "-icount", "shift=1,sleep=off", "-cpu", "max",
+        "qemu-system-x86_64", "-M", "pc", "-accel", "tcg", "-icount", "shift=1,sleep=on", "-cpu", "max",
         "-smp", "1", "-m", "768", "-nodefaults", "-no-user-config", "-display", "none",
         "-serial", "stdio", "-no-reboot", "-kernel", str(kernel), "-initrd", str(initrd),
         "-append", "console=ttyS0 quiet panic=-1 random.trust_cpu=on mitigations=off tsc=reliable no_timer_check",
