@@ -20,11 +20,7 @@ def expected_failures(classifier):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "options",
-    [{}, asdict(PAPER), {"laplace": True, "pruning": "none"}],
-    ids=["default", "paper", "laplace"],
-)
+@pytest.mark.parametrize("options", [{}, asdict(PAPER), {"laplace": True, "pruning": "none"}])
 @pytest.mark.filterwarnings("ignore")
 def test_scikit_learns_checks(options):
     from sklearn.utils.estimator_checks import check_estimator
