@@ -236,7 +236,7 @@ def main() -> None:
         print("\n".join(pushed(1 if given.short else 12)))
         return
     rows = list(injected(("hybrid",), FAULTS[:1], ("left",)) if given.short else injected(CONTROLLERS))
-    rows += hostile()
+    rows += [next(hostile())] if given.short else hostile()
     print("\n".join(table(rows)))
 
 

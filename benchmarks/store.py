@@ -84,7 +84,7 @@ def main() -> None:
     parser.add_argument("--trials", type=int, default=100_000)
     given = parser.parse_args()
     if given.short:
-        given.trials = 5_000
+        given.trials = 2_000
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
         with Store.open(folder) as store:

@@ -37,6 +37,7 @@ def copies_said(trials):
     return [note for note in trials.notes if "copies" in note]
 
 
+@pytest.mark.slow
 @settings(max_examples=25)
 @given(
     seed=st.integers(0, 1000),

@@ -329,6 +329,7 @@ def test_minutes_of_the_day_are_told_where_the_labels_are_in_blocks(n, tmp_path)
     assert not notes_on(tmp_path / "t.csv", "x", [*minutes[:3], *minutes[:-3]], mixed, range(n))
 
 
+@pytest.mark.slow
 @settings(max_examples=25)
 @given(seed=st.integers(0, 10_000))
 def test_numbers_that_stay_for_a_few_lines_each_are_told(tmp_path_factory, seed):
@@ -344,6 +345,7 @@ def test_numbers_that_stay_for_a_few_lines_each_are_told(tmp_path_factory, seed)
     ]
 
 
+@pytest.mark.slow
 @settings(max_examples=25)
 @given(
     seed=st.integers(0, 10_000), objects=st.sampled_from([1, 3, 6]), spread=st.sampled_from([0.05, 0.3, 1.0])

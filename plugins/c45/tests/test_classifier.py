@@ -19,14 +19,8 @@ def expected_failures(classifier):
     return {check: why} if classifier.pruning == "reduced_error" else {}
 
 
-@pytest.mark.parametrize(
-    "options",
-    [
-        pytest.param({}, id="default"),
-        pytest.param(asdict(PAPER), id="paper", marks=pytest.mark.slow),
-        pytest.param({"laplace": True, "pruning": "none"}, id="laplace", marks=pytest.mark.slow),
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("options", [{}, asdict(PAPER), {"laplace": True, "pruning": "none"}])
 @pytest.mark.filterwarnings("ignore")
 def test_scikit_learns_checks(options):
     from sklearn.utils.estimator_checks import check_estimator

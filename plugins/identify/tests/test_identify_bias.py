@@ -10,7 +10,7 @@ from squeezes import ready
 
 from graspsense_identify.fit import fit
 from graspsense_identify.forward import RIGID_PADS, ForwardModel
-from graspsense_identify.interval import interval_of_mean, normal, student
+from graspsense_identify.interval import NORMAL, interval_of_mean, student
 from graspsense_identify.laws import scale_of, static_candidates
 from graspsense_identify.parts import parts_of
 from graspsense_identify.prepare import prepared
@@ -47,7 +47,7 @@ def coverage(squeezes, ratio):
     degrees = squeezes - 1
     levels = (np.arange(2000) + 0.5) / 2000
     scatter = ratio * chi2.ppf(levels, degrees) / degrees
-    least = np.array([[(normal() / student(degrees)) ** 2]])
+    least = np.array([[(NORMAL / student(degrees)) ** 2]])
     variances = np.array([at_least(np.array([[variance]]), least)[0, 0] for variance in scatter])
     half = np.sqrt(variances / ratio) * student(degrees)
     return float(np.mean(2.0 * norm.cdf(half) - 1.0))
@@ -76,5 +76,5 @@ def test_the_interval_of_a_mean_is_that_of_student():
     assert (low + high) / 2.0 == pytest.approx(2.0)
     assert high - low == pytest.approx(2.0 * 2.91999 / np.sqrt(3.0), rel=1e-5)
     assert np.isnan(interval_of_mean([1.0])).all()
-    assert normal() == pytest.approx(1.644854, rel=1e-6)
-    assert student(10**6) == pytest.approx(normal(), rel=1e-5)
+    assert pytest.approx(1.644854, rel=1e-6) == NORMAL
+    assert student(10**6) == pytest.approx(NORMAL, rel=1e-5)

@@ -21,7 +21,7 @@ from attrs import frozen
 from graspsense.simulator_api import IdentifiedParameter, Undetermined
 from graspsense_identify.choose import LEAST_GAIN, Choice
 from graspsense_identify.fit import LEAST_ERROR, Fitted, in_threads, information, linear_covariance
-from graspsense_identify.interval import identified, normal
+from graspsense_identify.interval import NORMAL, identified
 from graspsense_identify.parts import has_objects, parts_of
 from graspsense_identify.prepare import MAX_LAG_S
 from graspsense_identify.refuse import shows_memory
@@ -138,8 +138,8 @@ def delay_of(fitted: Fitted, settings_s: float, lag_s: float) -> Delay:
     lags = np.array([[part.fitted.lag_s] for part in again.parts])
     scattered = again.factor * math.sqrt(float(again.covariance(lags)[0, 0]))
     # Where the motion does not show a lag, the fits stay where they begin and do not scatter.
-    random = max(scattered, normal() * math.sqrt(linear_covariance(lagging, LEAST_ERROR)[-1, -1]))
-    half = math.hypot(random, normal() * PATH_ERROR_S)
+    random = max(scattered, NORMAL * math.sqrt(linear_covariance(lagging, LEAST_ERROR)[-1, -1]))
+    half = math.hypot(random, NORMAL * PATH_ERROR_S)
     shown = used_s + lagging.lag_s
     return Delay(
         settings_s=settings_s,

@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike
 from graspsense.simulator_api import IdentifiedParameter
 
 LEVEL: Final = 0.90
-_QUANTILE: Final = 0.5 + 0.5 * LEVEL
+NORMAL: Final = 1.6448536269514722
+"""Half the width of the interval of a normal distribution, in standard deviations."""
 NO_INTERVAL: Final = (math.nan, math.nan)
 
 UNITS: Final = {
@@ -28,16 +29,9 @@ UNITS: Final = {
 
 def student(degrees: int) -> float:
     """Return half the width of the interval of Student's t with so many degrees of freedom, in standard deviations."""
-    from scipy.stats import t
+    from scipy.special import stdtrit
 
-    return float(t.ppf(_QUANTILE, degrees))
-
-
-def normal() -> float:
-    """Return half the width of the interval of a normal distribution, in standard deviations."""
-    from scipy.stats import norm
-
-    return float(norm.ppf(_QUANTILE))
+    return float(stdtrit(degrees, 0.5 + 0.5 * LEVEL))
 
 
 def interval_of_mean(values: ArrayLike) -> tuple[float, float]:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from graspsense_identify.corners import corner_errors
 from graspsense_identify.fit import Fitted, linear_covariance
-from graspsense_identify.interval import normal
+from graspsense_identify.interval import NORMAL
 from graspsense_identify.parts import LEAST_INSTANCES, Parts
 
 Floats = NDArray[np.float64]
@@ -77,7 +77,7 @@ def uncertainty(
     factor = parts.factor
     scattered = parts.covariance(np.log([part.fitted.values for part in parts.parts]))
     linear = linear_covariance(fitted, PATH_FORCE_ERROR)
-    covariance = at_least(scattered, linear * (normal() / factor) ** 2)
+    covariance = at_least(scattered, linear * (NORMAL / factor) ** 2)
     # An error of the scale of the force is common to all squeezes, so that none of them shows it.
     scaled = force_scale * np.array([parameter.is_force for parameter in fitted.candidate.free])
     own = np.outer(scaled, scaled) + PATH_ERROR**2 * np.eye(len(fitted.values))
@@ -86,7 +86,7 @@ def uncertainty(
         later = [squeeze.delayed(lag_error_s) for squeeze in fitted.squeezes]
         shift = np.log(evolve(fitted, squeezes=later).refitted().values) - np.log(fitted.values)
         own += np.outer(shift, shift)
-    covariance = covariance + own * (normal() / factor) ** 2
+    covariance = covariance + own * (NORMAL / factor) ** 2
     spread = np.sqrt(np.diag(covariance))
     best = np.array(fitted.values)
     low, high = best * _changed(-factor * spread), best * _changed(factor * spread)
@@ -98,7 +98,7 @@ def uncertainty(
         low=tuple(low.tolist()),
         high=tuple(high.tolist()),
         basis=parts.basis,
-        draws=best * _changed(factor / normal() * drawn),
+        draws=best * _changed(factor / NORMAL * drawn),
         stiffness=_components(np.log(fitted.factors), names),
         width_m=_components(np.array(fitted.widths_m), names),
     )

@@ -5,8 +5,8 @@
 DIR holds an unpacked kernel package (boot/vmlinuz-*, lib/modules/*). No image is built: `/` is shared read-only over
 9p with a file system in memory on top, so that every path of here works there and every write is lost, but for those
 to /run/share. The exit code is the command's; 125 where the machine did not boot or did not finish. Software emulation
-is used also where KVM works: time then goes by instructions, and what is found does not depend on what else
-runs here. Needs qemu-system-x86_64 and a static busybox, and no root.
+is used also where KVM works: while a program computes, time then goes by instructions, and what is found hardly depends
+on what else runs here. Needs qemu-system-x86_64 and a static busybox, and no root.
 """
 
 from __future__ import annotations
@@ -81,9 +81,9 @@ def run(kernel: Path, initrd: Path, share: Path, timeout_s: float) -> int:
     status = share / ".status"
     status.unlink(missing_ok=True)
     command = [
-        # Time there goes by instructions, 2 ns each: a load on this machine makes it last longer and changes nothing
-        # else.
-        "qemu-system-x86_64", "-M", "pc", "-accel", "tcg", "-icount", "shift=1,sleep=off", "-cpu", "max",
+        # Time there goes by instructions, 2 ns each, and by the clock of this machine while it waits. Without sleeping
+        # it would go on to the next timer at once, and each file of the host come after seconds of it.
+        "qemu-system-x86_64", "-M", "pc", "-accel", "tcg", "-icount", "shift=1,sleep=on", "-cpu", "max",
         "-smp", "1", "-m", "768", "-nodefaults", "-no-user-config", "-display", "none",
         "-serial", "stdio", "-no-reboot", "-kernel", str(kernel), "-initrd", str(initrd),
         "-append", "console=ttyS0 quiet panic=-1 random.trust_cpu=on mitigations=off tsc=reliable no_timer_check",

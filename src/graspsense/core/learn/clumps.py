@@ -101,11 +101,19 @@ def _separation(values: Values) -> float:
 def _draws(values: Values, rng: np.random.Generator) -> Iterator[Values]:
     """Yield independent trials with the same values of each feature and about the same correlations of their ranks."""
     from scipy.special import ndtri
-    from scipy.stats import rankdata
 
-    scores = ndtri((rankdata(values, axis=0) - 0.5) / len(values))
+    scores = ndtri((mean_ranks(values) - 0.5) / len(values))
     _, sizes, axes = np.linalg.svd(scores, full_matrices=False)
     spread, ranked = sizes[:, np.newaxis] * axes, np.sort(values, axis=0)
     for _ in range(_DRAWS):
         normal = rng.normal(size=(len(values), len(sizes))) @ spread
         yield np.take_along_axis(ranked, np.argsort(np.argsort(normal, axis=0), axis=0), axis=0)
+
+
+def mean_ranks(values: Values) -> Values:
+    """Return the ranks in each column, from 1 on: equal values have their mean rank, and missing ones none."""
+    ranks = np.empty(values.shape)
+    for column, ranked in zip(values.T, ranks.T, strict=True):
+        _, places, counts = np.unique(column, return_inverse=True, return_counts=True)
+        ranked[:] = (np.cumsum(counts) - (counts - 1) / 2.0)[places]
+    return np.where(np.isnan(values), np.nan, ranks)

@@ -28,7 +28,7 @@ import numpy as np
 from attrs import evolve
 
 from graspsense.core.components.caller import option
-from graspsense.core.learn.clumps import NEAREST, parts_of_clumps
+from graspsense.core.learn.clumps import NEAREST, mean_ranks, parts_of_clumps
 from graspsense.core.learn.labelled import class_of
 from graspsense.core.values.errors import counted
 
@@ -317,13 +317,11 @@ def beyond_chance(means: Values, codes: Numbers, statistic: Callable[[Values], f
 
     It is computed from the ranks of each feature within a label, as shares about zero. `codes` are as in `_likeness`.
     """
-    from scipy.stats import rankdata
-
     ranks = np.zeros(means.shape)
     for code in np.unique(codes).tolist():
         rows = codes == code
         if rows.sum() >= _FEWEST_BLOCKS:
-            placed = rankdata(means[rows], axis=0, nan_policy="omit") / rows.sum()
+            placed = mean_ranks(means[rows]) / rows.sum()
             known = np.maximum((~np.isnan(placed)).sum(axis=0), 1)
             ranks[rows] = np.nan_to_num(placed - np.nansum(placed, axis=0) / known)
     rng = np.random.default_rng(0)
