@@ -4,11 +4,11 @@ An answer rests on a probability, and in a tree on the number of training trials
 was chosen for its trials, so that 4 of 4 means less than 57 of 57, by how much only held-out trials tell. They are
 divided into classes of support, each with enough of them. Within a class the rate of right answers rises with the
 probability (isotonic regression, R. E. Barlow et al., Statistical Inference under Order Restrictions, 1972). Each step
-of it has enough units. The rates are drawn together, and towards guessing, by what chance spreads them, and each is
-(right + 1) / (all + 2), so that no answer is certain. Its 95 % interval is that of a beta distribution with this mean:
-from few units a rate is known as badly as that, whatever the luck of these trials. Answers of a cross-validation count
-for less than others: its models share training trials, so that the answers of all of them are lucky together. Answers
-of one unit, such as grasps of an object, count as one, or as more where units differ little (the design effect of L.
+of it has enough units. The rates are drawn towards guessing, by what chance spreads their mean, and each is (right + 1)
+/ (all + 2), so that no answer is certain. Its 95 % interval is that of a beta distribution with this mean: from few
+units a rate is known as badly as that, whatever the luck of these trials. Answers of a cross-validation count for less
+than others: its models share training trials, so that the answers of all of them are lucky together. Answers of one
+unit, such as grasps of an object, count as one, or as more where units differ little (the design effect of L.
 Kish, Survey Sampling, 1965).
 
 Where labels are not equally frequent, answers with a rare one are right less often than others that are as probable. So
@@ -37,11 +37,11 @@ from graspsense.core.learn.stored_values import StoredValues
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-STEP_UNITS: Final = 15
+STEP_UNITS: Final = 30
 """Least number of units from which a rate is computed, if there are as many.
 
-The highest step is the luckiest. The rates are drawn together for it: where the probability tells nothing, the highest
-is 2 points too high, in place of 6.
+The highest step is the luckiest: where the probability tells nothing, its rate is 2 points too high. With steps of 15
+units it would be 6.
 """
 STEP_SHARE: Final = 0.02
 """Least share of all units from which a rate is computed: more units give more exact rates, and not more of them."""
@@ -375,36 +375,13 @@ def _steps(
     right_in, units = (
         np.asarray(np.bincount(level_of, counts), dtype=np.float64) / effect for counts in (right_of, all_of)
     )
-    drawn = np.maximum(_drawn_together(right_in, units, len(all_of), guessing), guessing)
+    # Of the distance of the mean from guessing, what has the least squared error if it is as large as it seems.
+    right_of_all, all_units = float(right_in.sum()), float(units.sum())
+    mean, likely = right_of_all / all_units, (right_of_all + 1.0) / (all_units + 2.0)
+    above = all_units * (mean - guessing) ** 2 / (likely * (1.0 - likely))
+    drawn = np.maximum(right_in / units - max(mean - guessing, 0.0) / (above + 1.0), guessing)
     # Two answers more, one of them right, leave none certain; they make no guess among several labels surer.
     rates = np.maximum.accumulate(np.minimum((units * drawn + 1.0) / (units + 2.0), drawn))
     ends = (betaincinv(rates * (units + 2.0), (1.0 - rates) * (units + 2.0), end) for end in (0.025, 0.975))
     begins = (edges[number] for number in first_of.tolist())
     return tuple(begins), tuple(rates.tolist()), tuple(zip(*(end.tolist() for end in ends), strict=True))
-
-
-def _drawn_together(
-    right: NDArray[np.float64], units: NDArray[np.float64], bins: int, guessing: float
-) -> NDArray[np.float64]:
-    """Return the rates of rising levels, drawn towards their mean, and it towards guessing, by what chance spreads.
-
-    Of the distance of the mean from guessing remains what has the least squared error if it is as large as it seems:
-    s / (s + 1), where s is its square in variances. To take off what chance makes, as from the spread of the levels,
-    would leave nothing of 13 right answers of 20.
-
-    Levels of `bins` equal rates have a sum of squares that is distributed as chi-bar-square: of their mean number
-    1 + 1/2 + ... + 1/bins, one is the mean (Barlow et al., 1972, chapter 3). That it shrinks the rates as the share of
-    the spread is empirical Bayes (C. N. Morris, J. Am. Stat. Assoc. 78 (1983) 47). Chance makes several levels with the
-    probability 1 - 1/bins.
-    """
-    mean = float(right.sum() / units.sum())
-    likely = (float(right.sum()) + 1.0) / (float(units.sum()) + 2.0)
-    above = units.sum() * (mean - guessing) ** 2 / (likely * (1.0 - likely))
-    drawn = guessing + above / (above + 1.0) * (mean - guessing) if mean > guessing else mean
-    rates = right / units
-    if len(rates) == 1:
-        return np.array([drawn])
-    spread = float((units * (rates - mean) ** 2).sum()) / (mean * (1.0 - mean))
-    by_chance = sum(1.0 / k for k in range(2, bins + 1)) / (1.0 - 1.0 / bins)
-    remaining = 1.0 - by_chance / spread if spread > by_chance else 0.0
-    return np.asarray(drawn + remaining * (rates - mean))

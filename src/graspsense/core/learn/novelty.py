@@ -159,26 +159,24 @@ class Novelty:
 
 def novelty_of(table: FeatureTable, labels: Sequence[str]) -> Novelty:
     """Return the ranges of these training trials."""
-    values = table.values
+    values, given = table.values, np.array(labels)
     classes = tuple(sorted(set(labels)))
-    given = np.array(labels)
-    lowest = np.full((len(classes), len(table.names)), np.nan)
-    highest = lowest.copy()
-    squares, freedom = np.zeros(len(table.names)), np.zeros(len(table.names))
+    lowest, highest = np.full((2, len(classes), len(table.names)), np.nan)
+    squares, freedom = np.zeros(len(table.names)), np.zeros(len(table.names), dtype=np.int64)
     for k, label in enumerate(classes):
-        rows = values[given == label]
-        for f in range(len(table.names)):
-            known = rows[~np.isnan(rows[:, f]), f]
-            if len(known):
-                lowest[k, f], highest[k, f] = known.min(), known.max()
-                squares[f] += float(((known - known.mean()) ** 2).sum())
-                freedom[f] += len(known) - 1
-    with np.errstate(invalid="ignore", divide="ignore"):
-        spread = np.sqrt(squares / freedom)
+        rows = values[given == label].T.copy()
+        known = ~np.isnan(rows)
+        trials = known.sum(axis=1)
+        have = trials > 0
+        lowest[k, have], highest[k, have] = np.nanmin(rows[have], axis=1), np.nanmax(rows[have], axis=1)
+        means = np.where(known, rows, 0.0).sum(axis=1) / np.maximum(trials, 1)
+        squares += np.where(known, (rows - means[:, np.newaxis]) ** 2, 0.0).sum(axis=1)
+        freedom += np.maximum(trials - 1, 0)
+    spread = np.sqrt(squares / np.maximum(freedom, 1))
     for f in np.flatnonzero(freedom == 0).tolist():
         # With one trial in each class, the differences between classes are the only measure of spread.
-        known = values[~np.isnan(values[:, f]), f]
-        spread[f] = float(known.std()) if len(known) else math.nan
+        measured = values[~np.isnan(values[:, f]), f]
+        spread[f] = float(measured.std()) if len(measured) else math.nan
     return Novelty(
         names=table.names,
         units=table.units,
