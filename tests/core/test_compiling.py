@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from commands import python
 
-from graspsense.core.compiling import compiled_code_folder as folder_module
 from graspsense.core.compiling import compiling
 from graspsense.core.compiling.compiled_code_folder import compiled_code_folder, delete_older_half
 from graspsense.simulator_api import (
@@ -289,16 +288,6 @@ def test_an_edited_helper_or_constant_of_another_module_is_noticed(tmp_path):
 
 
 @pytest.mark.slow
-def test_the_same_code_in_another_folder_or_further_down_in_its_file_is_not_compiled_again(tmp_path):
-    law = "def law(x):\n    return 2.0 * x + 1.0\n"
-    told = []
-    for name, text in (("here", law), ("there", law), ("further down", f"# A comment.\n\n\n{law}")):
-        program = write(tmp_path / name, program=CALLS_LAW, law=text, shapes="number = float\n")
-        told += run(program, "number", NUMBA_CACHE_DIR=str(tmp_path / "kept"))
-    assert told == ["7.0 0", "7.0 1", "7.0 1"]
-
-
-@pytest.mark.slow
 def test_code_of_a_version_with_other_types_is_made_anew(tmp_path):
     """The code of the function stays the same, but the type of its argument has another name."""
     shape = "from typing import NamedTuple\n\nclass {}(NamedTuple):\n    stiffness: float\n"
@@ -345,12 +334,6 @@ def test_a_called_function_that_is_replaced_before_the_first_call_is_not_kept_un
     assert compile_function(law)(2.0) == 12.0
 
 
-@pytest.mark.slow
-def test_where_nothing_can_be_kept_functions_are_compiled_all_the_same(tmp_path):
-    program = write(tmp_path, compose=COMPOSE)
-    assert run(program, "soft", XDG_CACHE_HOME=str(program), NUMBA_CACHE_DIR="") == ["soft 100.0 0"]
-
-
 def test_the_older_half_of_the_compiled_code_is_deleted_where_there_is_much(tmp_path):
     for i in range(6):
         (tmp_path / f"{i}").touch()
@@ -360,13 +343,6 @@ def test_the_older_half_of_the_compiled_code_is_deleted_where_there_is_much(tmp_
     assert len(list(tmp_path.iterdir())) == 6
     delete_older_half(tmp_path, 6)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["3", "4", "5"]
-
-
-def test_a_user_without_a_home_has_no_folder_for_compiled_code(monkeypatch):
-    monkeypatch.setattr(folder_module, "cache_folder", lambda: None)
-    compiled_code_folder.cache_clear()
-    assert compiled_code_folder() is None
-    compiled_code_folder.cache_clear()
 
 
 def test_nothing_is_compiled_where_numba_is_switched_off(monkeypatch):
