@@ -2,7 +2,6 @@
 
 import base64
 import hashlib
-import math
 import re
 from html.parser import HTMLParser
 from importlib.resources import files
@@ -30,8 +29,7 @@ from graspsense.report.found_table import FoundTable
 from graspsense.report.html import Page, table
 from graspsense.report.rates import RateRow, rate_scale, rates_over, rates_picture
 from graspsense.report.store_page import store_page
-from graspsense.report.svg import GRID, GROUND, INKS, QUIET, TEXT, AxisScale, Picture
-from graspsense.report.traces import _label_lines
+from graspsense.report.svg import GRID, GROUND, INKS, QUIET, TEXT, AxisScale
 from graspsense.report.verdict import headline, verdict
 from graspsense.store.store import Store
 
@@ -216,15 +214,6 @@ def test_pictures_and_the_style_sheet_have_the_same_colours():
     for colour in (*INKS, QUIET, TEXT, GROUND, GRID):
         name, fallback = re.fullmatch(r"var\(--(\w+),(#\w+)\)", colour).groups()
         assert light[name] in (fallback, "#" + "".join(2 * digit for digit in fallback[1:])), name
-
-
-@every_case("share", [k / 40 for k in range(1, 41)])
-def test_more_of_a_row_has_a_stronger_colour(share):
-    true = ["a"] * 40 + ["b"]
-    predicted = ["a"] * round(40 * share) + ["b"] * (41 - round(40 * share))
-    levels = re.findall(r'class="q(\d)', confusion_table(confusion(true, predicted), "x"))
-
-    assert int(levels[0]) == math.ceil(8 * share)
 
 
 @every_case(
@@ -425,17 +414,3 @@ def test_the_page_of_a_store_that_cannot_be_judged_has_its_grasp_with_its_warnin
     assert page.answer.startswith("There is 1 grasp, but no recognition rate: ")
     assert "One grasp, " in Reader(page.html()).text
     assert '<ul class="warning"><li>left fingertip stuck: check its cable</li></ul>' in page.html()
-
-
-def test_long_names_have_a_line_or_two_within_their_picture():
-    assert _label_lines("can:full_open") == ["can:full_open"]
-    assert _label_lines("a_bottle_of_orange_juice:full_open") == ["a_bottle_of_orange_juice:", "full_open"]
-    for label in ("n" * 180 + ":y", "quite_a_long_name_of_a_bottle_1:full_and_closed", "word " * 40):
-        lines = _label_lines(label)
-        assert len(lines) == 2
-        assert lines[1].endswith("…") is (len(label) > 50)
-    picture = Picture(100.0)
-    picture.title("feature" + "_that_is_long" * 10)
-    (drawn,) = picture.parts
-    assert "…" in drawn
-    assert len(re.sub("<[^>]*>", "", drawn)) < 60
