@@ -1,13 +1,13 @@
 """A model is tried before it is used: levels from large to small tolerances, and a refusal where none suffices."""
 
 import math
-from functools import partial
 from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
 import pytest
 from attrs import evolve, frozen
+from cases import slow
 from random_scenes import record_of
 
 from graspsense.core.grasp.runner import run_grasp
@@ -35,7 +35,6 @@ CONFIG = SimConfig(sensor="ideal", spread=False)
 NEAR = evolve(CONFIG, open_gap_m=0.053, rate_hz=250.0)
 """The fingers close from 3 mm away on what is `made up`, in few ticks."""
 UNSURE = ["peak", "trace", "features"]
-slow = partial(pytest.param, marks=pytest.mark.slow)
 SHELL = ("elastic", {"k1_n_m": 2000.0, "k3_n_m3": 2e6})
 
 

@@ -2,18 +2,17 @@
 
 import json
 import shlex
-from functools import partial
 from importlib.resources import files
 from pathlib import Path
 
 import pytest
+from cases import slow
 from commands import answered, printed, python
 
 pytest.importorskip("graspsense_c45", reason="the default model is a tree of graspsense-c45")
 
 from graspsense import load_pipeline
 
-slow = partial(pytest.param, marks=pytest.mark.slow)
 MODELS = files("graspsense_sim_gripper").joinpath("models")
 KEPT = json.loads(MODELS.joinpath("default.json").read_text(encoding="utf-8"))
 BEST = json.loads(MODELS.joinpath("best.json").read_text(encoding="utf-8"))
