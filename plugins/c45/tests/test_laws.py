@@ -1,5 +1,6 @@
 """The laws by themselves, against textbook values and the mathematics."""
 
+import itertools
 import math
 
 import numpy as np
@@ -16,7 +17,7 @@ from graspsense_c45.arithmetic import (
     term,
     x_ln_x,
 )
-from graspsense_c45.building.cuts import rough_scale, rough_term
+from graspsense_c45.building.cuts import Limits, Run, rough_scale, rough_term, scan_unit, scan_weighted
 from graspsense_c45.estimates import estimated_errors, prepare_confidence
 
 
@@ -49,6 +50,51 @@ def test_estimates_at_the_ends():
     assert estimated_errors(3.0, 1.0, prepare_confidence(0.6)) == 1.0
     for weight in np.linspace(1.0, 50.0, 500).tolist():
         assert weight * 0.3 <= estimated_errors(weight, weight * 0.3, confidence) <= weight + 1e-12
+
+
+def best_place(numerators, limits):
+    best, taken = 0, -1
+    for i, numerator in numerators.items():
+        if numerator - best > limits.tolerance and numerator >= limits.least_numerator:
+            best, taken = numerator, i
+    return taken, best
+
+
+def numerator_of(left, right, scale):
+    """Of the gain of a cut (see `criteria.gain`), from the weights of the classes on its sides."""
+    sides = sum(term(weight, scale) for weight in (*left, *right)) - term(sum(left), scale)
+    whole = [sum(pair) for pair in zip(left, right, strict=True)]
+    undivided = term(sum(whole), scale) - sum(term(weight, scale) for weight in whole)
+    return undivided + sides - term(sum(right), scale)
+
+
+def test_best_cut_is_the_first_of_those_within_the_tolerance():
+    # Tolerances of the size of the differences, so that the first of several near-ties decides.
+    rng, scale = np.random.default_rng(3), Scale(0, 40)
+    for _ in range(300):
+        n, n_classes = int(rng.integers(2, 30)), int(rng.integers(1, 5))
+        values, labels = sorted(rng.integers(0, 12, n).tolist()), rng.integers(0, n_classes, n).tolist()
+        rows, weights = rng.permutation(n).tolist(), [1] * n
+        limits = Limits(True, int(rng.integers(1, 4)), *map(int, rng.integers(0, 2**40, 2)))
+        by_class = [[w * (labels[row] == k) for k in range(n_classes)] for row, w in enumerate(weights)]
+        numerators = {}
+        for i in range(n - 1):
+            left, right = (
+                [sum(column) for column in zip(*(by_class[row] for row in side), strict=True)]
+                for side in (rows[: i + 1], rows[i + 1 :])
+            )
+            if min(sum(left), sum(right)) >= limits.least_weight and values[i] < values[i + 1]:
+                numerators[i] = numerator_of(left, right, scale)
+        counts = [labels.count(k) for k in range(n_classes)]
+        run = Run(rows, values, 0, n, labels, counts, [0] * n_classes)
+        terms = [term(number, scale) for number in range(n + 1)]
+        steps = [high - low for low, high in itertools.pairwise(terms)]
+        for cut in (
+            scan_unit(run, terms, steps, limits),
+            scan_weighted(run, weights, [0] * n_classes, scale, limits),
+        ):
+            assert (cut.place, cut.numerator) == best_place(numerators, limits)
+            assert cut.n_cuts == len(numerators)
 
 
 def test_rough_terms_are_far_closer_than_the_tolerance():
