@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from commands import python
 
+from graspsense.core.compiling import compiled_code_folder as folder_module
 from graspsense.core.compiling import compiling
 from graspsense.core.compiling.compiled_code_folder import compiled_code_folder, delete_older_half
 from graspsense.simulator_api import (
@@ -343,6 +344,13 @@ def test_the_older_half_of_the_compiled_code_is_deleted_where_there_is_much(tmp_
     assert len(list(tmp_path.iterdir())) == 6
     delete_older_half(tmp_path, 6)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["3", "4", "5"]
+
+
+def test_a_user_without_a_home_has_no_folder_for_compiled_code(monkeypatch):
+    monkeypatch.setattr(folder_module, "cache_folder", lambda: None)
+    compiled_code_folder.cache_clear()
+    assert compiled_code_folder() is None
+    compiled_code_folder.cache_clear()
 
 
 def test_nothing_is_compiled_where_numba_is_switched_off(monkeypatch):

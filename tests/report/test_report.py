@@ -29,7 +29,8 @@ from graspsense.report.found_table import FoundTable
 from graspsense.report.html import Page, table
 from graspsense.report.rates import RateRow, rate_scale, rates_over, rates_picture
 from graspsense.report.store_page import store_page
-from graspsense.report.svg import GRID, GROUND, INKS, QUIET, TEXT, AxisScale
+from graspsense.report.svg import GRID, GROUND, INKS, QUIET, TEXT, AxisScale, Picture
+from graspsense.report.traces import _label_lines
 from graspsense.report.verdict import headline, verdict
 from graspsense.store.store import Store
 
@@ -414,3 +415,17 @@ def test_the_page_of_a_store_that_cannot_be_judged_has_its_grasp_with_its_warnin
     assert page.answer.startswith("There is 1 grasp, but no recognition rate: ")
     assert "One grasp, " in Reader(page.html()).text
     assert '<ul class="warning"><li>left fingertip stuck: check its cable</li></ul>' in page.html()
+
+
+def test_long_names_have_a_line_or_two_within_their_picture():
+    assert _label_lines("can:full_open") == ["can:full_open"]
+    assert _label_lines("a_bottle_of_orange_juice:full_open") == ["a_bottle_of_orange_juice:", "full_open"]
+    for label in ("n" * 180 + ":y", "quite_a_long_name_of_a_bottle_1:full_and_closed", "word " * 40):
+        lines = _label_lines(label)
+        assert len(lines) == 2
+        assert lines[1].endswith("…") is (len(label) > 50)
+    picture = Picture(100.0)
+    picture.title("feature" + "_that_is_long" * 10)
+    (drawn,) = picture.parts
+    assert "…" in drawn
+    assert len(re.sub("<[^>]*>", "", drawn)) < 60

@@ -14,7 +14,8 @@ from graspsense.cli.main import cli
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.accuracy.levels import PLAIN
 from graspsense_sim_gripper.run.accuracy.propose import grip_of, propose
-from graspsense_sim_gripper.run.build import Problem
+from graspsense_sim_gripper.run.build import Problem, instantiate
+from graspsense_sim_gripper.scene.library import find
 from graspsense_sim_gripper.scene.spec import ObjectSpec
 
 CONFIG = SimConfig(sensor="ideal", spread=False)
@@ -36,6 +37,14 @@ def test_a_contact_too_stiff_for_the_tick_is_said_to_be():
     for stiffness, said in ((1e6, "trace resolved"), (1e7, "trace not verified")):
         surface = ("surface", {**light, "contact_n_m": stiffness})
         assert decided(surface, rigid)["contact"].decision == said
+
+
+def test_instances_share_the_steps_of_their_kind():
+    problem = Problem(SimConfig(sensor="ideal"), find("odwalla:empty_open"))
+    model = propose(problem, grip_of(problem))
+    setup, other = (instantiate(problem, model, seed) for seed in (1, 2))
+    assert setup.plant.steps == other.plant.steps == model.steps
+    assert setup.terms != other.terms
 
 
 def test_run_reports_each_decision_with_its_number():
