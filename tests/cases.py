@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterable
+from functools import partial
 from typing import Any
 
 import pytest
+
+slow = partial(pytest.param, marks=pytest.mark.slow)
+"""A case of `pytest.mark.parametrize` that CI runs too, and the quick run does not."""
 
 
 def every_case(names: str | tuple[str, ...], cases: Iterable[Any]) -> Callable[..., Any]:

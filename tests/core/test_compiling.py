@@ -289,16 +289,6 @@ def test_an_edited_helper_or_constant_of_another_module_is_noticed(tmp_path):
 
 
 @pytest.mark.slow
-def test_the_same_code_in_another_folder_or_further_down_in_its_file_is_not_compiled_again(tmp_path):
-    law = "def law(x):\n    return 2.0 * x + 1.0\n"
-    told = []
-    for name, text in (("here", law), ("there", law), ("further down", f"# A comment.\n\n\n{law}")):
-        program = write(tmp_path / name, program=CALLS_LAW, law=text, shapes="number = float\n")
-        told += run(program, "number", NUMBA_CACHE_DIR=str(tmp_path / "kept"))
-    assert told == ["7.0 0", "7.0 1", "7.0 1"]
-
-
-@pytest.mark.slow
 def test_code_of_a_version_with_other_types_is_made_anew(tmp_path):
     """The code of the function stays the same, but the type of its argument has another name."""
     shape = "from typing import NamedTuple\n\nclass {}(NamedTuple):\n    stiffness: float\n"
@@ -343,12 +333,6 @@ def test_a_called_function_that_is_replaced_before_the_first_call_is_not_kept_un
     with pytest.raises(NotCompilable, match=r"test_compiling\._scaled.*`compile_function`"):
         compiled(2.0)
     assert compile_function(law)(2.0) == 12.0
-
-
-@pytest.mark.slow
-def test_where_nothing_can_be_kept_functions_are_compiled_all_the_same(tmp_path):
-    program = write(tmp_path, compose=COMPOSE)
-    assert run(program, "soft", XDG_CACHE_HOME=str(program), NUMBA_CACHE_DIR="") == ["soft 100.0 0"]
 
 
 def test_the_older_half_of_the_compiled_code_is_deleted_where_there_is_much(tmp_path):

@@ -425,16 +425,6 @@ def test_settings_as_a_file_resolve_by_themselves_to_the_same_values(plugins, wr
     assert to_toml(again).replace("again.toml", "lab.toml") == to_toml(resolved)
 
 
-def test_with_origins_it_is_still_the_same_file(plugins, write):
-    settings = resolve(write(BASE), options=["gripper.filter.order=3"])
-    text = to_toml(settings, origins=True)
-
-    assert tomllib.loads(text) == tomllib.loads(to_toml(settings))
-    assert 'port = "a"                                # lab.toml:3\n' in text
-    assert "filter = { cutoff_hz = 50.0, order = 3 }  # default, -o\n" in text
-    assert re.search("# serial .*  # default\n", text)
-
-
 TEXT = st.text(st.characters(exclude_categories=["Cs"]))
 PLAIN = st.recursive(
     st.booleans() | st.integers(-(2**63), 2**63 - 1) | st.floats(allow_nan=False) | TEXT,
@@ -461,20 +451,6 @@ def paths(value, path=()):
         for index, child in enumerate(value):
             yield (*path, index)
             yield from paths(child, (*path, index))
-
-
-@pytest.mark.slow
-@given(TABLES)
-def test_every_key_has_the_line_on_which_it_stands(values):
-    text = "# first\n" + "\n\n".join(
-        f"{toml_key(key)} = {toml_value(value)}" for key, value in values.items()
-    )
-
-    lines = key_lines(text)
-
-    assert set(lines) == set(paths(values))
-    for number, key in enumerate(values):
-        assert lines[(key,)] == 2 + 2 * number
 
 
 def test_lines_of_everything_that_toml_can_write():

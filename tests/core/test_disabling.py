@@ -133,22 +133,3 @@ def test_a_distribution_that_is_installed_twice_is_told_of(site, tmp_path, monke
     assert len(mine) == 1
     assert "installed 2 times" in row["advice"][0]
     assert "pip uninstall lab-peak" in row["advice"][0]
-
-
-DEFAULT = """
-    from graspsense.plugin_api import hookimpl
-    GRASPSENSE_API = (2, 0)
-    @hookimpl
-    def graspsense_probe_devices(timeout_s=1.0):
-        return []
-"""
-
-
-def test_a_hook_with_a_default_is_refused_with_what_to_write(site):
-    site.install("lab-peak", DEFAULT)
-
-    (status,) = [status for status in site.discover().statuses if status.distribution == "lab-peak"]
-
-    assert status.state == "broken"
-    assert "timeout_s a default" in status.reason
-    assert "write graspsense_probe_devices(timeout_s)" in status.reason

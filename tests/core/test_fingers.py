@@ -37,9 +37,7 @@ from graspsense.report.trace_plot import draw_trace
 from graspsense.sources.columns.grasp_columns import GraspColumns, checked_recording
 from graspsense.sources.recordings.dataset_recordings import readable_or_not
 from graspsense.sources.recordings.exported_grasp import read_exported
-from graspsense.testing.conformance import Examined
 from graspsense.testing.model_gripper import ModelGripper
-from graspsense.testing.subject import Subject
 
 HERE = sys.modules[__name__]
 FRAME = channels("gap", "velocity", "effort", "force_left", "force_right")
@@ -198,14 +196,6 @@ def test_the_pages_and_the_picture_draw_the_force_of_each_finger(grasped):
     (fingers,) = channel_figures(trial.trace, trial.device.channels)
     assert all(name in fingers for name in ("Forces of the fingers", "thumb", "index", "ring"))
     assert {"thumb", "index", "ring"} <= {line.get_label() for line in force.lines}
-
-
-@pytest.mark.slow
-def test_a_hand_with_three_fingers_conforms(grasped):
-    _, _, plugins = grasped
-    report = Examined((Subject(component=plugins.find("sensor-backend", "jaws")),)).report()
-
-    assert report.failures == []
 
 
 # ------------------------------------------------------------------------------------------------- recordings

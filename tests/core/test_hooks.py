@@ -206,11 +206,6 @@ def test_a_hook_that_asks_for_devices_has_the_answer_or_the_error_of_each_plugin
     assert other.error == f"{hook} gave '/dev/ttyUSB0': it takes {type(repeated).__name__} only"
 
 
-def test_a_device_is_told_in_words():
-    with pytest.raises(TypeError, match="'backend' must be <class 'str'>"):
-        FoundDevice(5, "42", "bus 1", ready=True)  # type: ignore[arg-type]
-
-
 def test_a_finding_is_in_one_of_three_states():
     with pytest.raises(ValueError, match=r"'state'.*\('ok', 'note', 'problem'\)"):
         Finding("cable", "fine", "straight")  # type: ignore[arg-type]

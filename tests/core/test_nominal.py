@@ -159,25 +159,6 @@ def test_a_damaged_arff_file_is_told_with_its_line(weather, old, new, line):
         load_trials(str(weather))
 
 
-@every_case(
-    ("texts", "said"),
-    [
-        ([f"grasp_{i:04d}.csv" for i in range(40)], "hardly repeat"),
-        ([f"2026-11-{1 + i // 10:02d}" for i in range(40)], "dates or times"),
-        ([f"{1 + i // 10}.11.2026 10:00" for i in range(40)], "dates or times"),
-        ([f"object {i // 4}" for i in range(40)], "held out together"),
-        ([("it slipped", "", "good", f"see {i}")[i % 4] for i in range(40)], "hardly repeat"),
-    ],
-)
-def test_texts_that_identify_trials_are_no_features(tmp_path, texts, said):
-    lines = [f"{'ab'[i // 20]},{text},{i % 7}.25" for i, text in enumerate(texts)]
-    path = tmp_path / "t.csv"
-    path.write_text("what,text,w\n" + "\n".join(lines) + "\n")
-    trials = read_labelled(path, "what")
-    assert trials.table.names == ("w",)
-    assert any("text" in note and said in note for note in trials.notes)
-
-
 @given(
     codes=st.lists(st.one_of(st.none(), st.integers(0, 3)), min_size=1, max_size=20),
     values=st.lists(st.text("ab= ,", min_size=1), min_size=4, max_size=4, unique=True),

@@ -211,6 +211,10 @@ HOOK = "@hookimpl\n    def graspsense_controllers(): "
         ("def graspsense_controllers(): return []", "write @hookimpl above it"),
         ("@hookimpl(wrapper=True)\n    def graspsense_controllers(): return (yield)", "is a wrapper"),
         ("@hookimpl\n    def graspsense_controllers(config): return []", "Argument(s) {'config'}"),
+        (
+            "@hookimpl\n    def graspsense_probe_devices(timeout_s=1.0): return []",
+            "write graspsense_probe_devices(timeout_s)",
+        ),
         (HOOK + "pass", "returned None: return the entries"),
         (HOOK + "return 'hybrid'", "returned 'hybrid'"),
         (HOOK + "yield 3", "gave 3: it takes ControllerEntry"),

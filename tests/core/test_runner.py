@@ -474,13 +474,6 @@ def test_an_endless_grasp_ends_after_the_grasp_and_three_openings_and_not_before
     assert 3500 + 100 <= len(gripper.commands) <= 3500 + 502
 
 
-def test_what_holds_for_a_grasp_unless_told():
-    # To open, without a frame, and for the longest grasp (s).
-    assert (RUN.opening_timeout_s, RUN.frame_timeout_s, RUN.grasp_timeout_s) == (5.0, 0.1, 300.0)
-    # A real gripper closes for the first time above its breakaway (8 N), far below a squeeze, and slowly.
-    assert (RUN.first_effort_n, RUN.first_speed_m_s, RUN.hold_s, RUN.late_periods) == (12.0, 0.015, 0.25, 5.0)
-
-
 def test_the_simulated_time_is_from_the_first_frame_to_the_last_and_that_on_the_wall_what_it_took():
     # A clock that does not begin at 0.
     later = Changed(with_frame(t_s=lambda frame: frame.t_s + 40.0), lose_at=51)

@@ -158,12 +158,6 @@ def test_every_command_refuses_an_implausible_setting_and_names_force(tmp_path, 
     assert ("add --force" in err, "--force" in err) == (command[0] != "import",) * 2
 
 
-@pytest.mark.slow
-def test_force_accepts_it():
-    option = ("-o", "controller.closing_speed_m_s=0.5", "-o", "classifier.type=none")
-    assert graspsense("run", *option, "--force", "--json")[0] == 0
-
-
 def test_a_sweep_over_implausible_values_is_refused(tmp_path):
     text = 'title = "fast"\nsweep = { "controller.closing_speed_m_s" = [0.01, 10.0] }\n'
     (tmp_path / "fast.toml").write_text(text)

@@ -134,16 +134,6 @@ def test_what_is_unpacked_is_what_was_packed_and_is_counted(kind, monkeypatch):
         Unpacked("f").unpack(kind, packed)
 
 
-def test_a_raised_limit_reads_the_file(tmp_path, monkeypatch):
-    path = tmp_path / "a.npz"
-    deflated_npz(path, 8 * MB)
-    monkeypatch.setenv(UNPACKED_MB.variable, "7")
-    with pytest.raises(TooLarge, match=r"a\.npz"):
-        npz_arrays(path)
-    monkeypatch.setenv(UNPACKED_MB.variable, "9")
-    assert npz_arrays(path)["a"].shape == (MB,)
-
-
 def npy(descr, shape):
     """Return the header of an array that says this."""
     header = (

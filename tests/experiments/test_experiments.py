@@ -507,11 +507,6 @@ def test_more_folds_than_recorded_trials_are_refused_before_any_task(file):
         read_experiment(str(file), ['sweep={"judge.folds"=[1000]}'])
 
 
-@pytest.mark.slow
-def test_what_there_is():
-    assert {load["name"] for load in answered("experiment")} == set(shipped())
-
-
 COMPARED = """
 title = "A sweep"
 question = "Does it matter?"

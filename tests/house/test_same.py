@@ -16,14 +16,6 @@ def test_the_last_bit_a_lost_nan_and_the_sign_of_zero_are_differences(after):
     assert difference("a", ONE, np.array(after)) is not None
 
 
-def test_what_differs_is_named_with_its_size():
-    assert difference("a", ONE, ONE.copy()) is None
-    assert difference("a", ONE, ONE[:2]).what == "shape (3,) became (2,)"
-    assert difference("a", None, ONE).what == "only in this checkout"
-    assert difference("a", ONE, None).what == "only in BASE"
-    assert difference("a", np.array([1.0, 2.0]), np.array([1.0, 2.5])).largest == 0.5
-
-
 def test_recordings_are_compared_by_name(tmp_path):
     np.savez(tmp_path / "before.npz", **{"hybrid|gap": ONE, "hybrid|outcome": np.array([1])})
     np.savez(tmp_path / "after.npz", **{"hybrid|gap": ONE, "hybrid|outcome": np.array([2])})

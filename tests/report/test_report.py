@@ -2,7 +2,6 @@
 
 import base64
 import hashlib
-import math
 import re
 from html.parser import HTMLParser
 from importlib.resources import files
@@ -216,15 +215,6 @@ def test_pictures_and_the_style_sheet_have_the_same_colours():
     for colour in (*INKS, QUIET, TEXT, GROUND, GRID):
         name, fallback = re.fullmatch(r"var\(--(\w+),(#\w+)\)", colour).groups()
         assert light[name] in (fallback, "#" + "".join(2 * digit for digit in fallback[1:])), name
-
-
-@every_case("share", [k / 40 for k in range(1, 41)])
-def test_more_of_a_row_has_a_stronger_colour(share):
-    true = ["a"] * 40 + ["b"]
-    predicted = ["a"] * round(40 * share) + ["b"] * (41 - round(40 * share))
-    levels = re.findall(r'class="q(\d)', confusion_table(confusion(true, predicted), "x"))
-
-    assert int(levels[0]) == math.ceil(8 * share)
 
 
 @every_case(

@@ -263,11 +263,6 @@ def test_labels_that_make_no_sense_are_refused_before_the_store_exists(tmp_path,
     assert not (tmp_path / "t").exists()
 
 
-@every_case("command", [("run", "--label"), ("import", "a.csv", "--label")])
-def test_a_label_with_a_space_is_refused_with_the_reason(tmp_path, command):
-    assert "without spaces" in refused(*command, "can#2 b", "--save", tmp_path / "t")
-
-
 @pytest.mark.slow
 def test_an_object_from_a_file_can_have_any_label(tmp_path):
     scene = tmp_path / "mine.toml"

@@ -3,6 +3,7 @@
 import json
 import os
 import pty
+import shlex
 import signal
 import subprocess
 import sys
@@ -25,18 +26,7 @@ from graspsense.store.store import Store
 
 ENDS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
 IN_THE_SQUEEZE = 1200
-COLUMNS = (
-    "--time",
-    "t",
-    "--gap",
-    "gap",
-    "--force",
-    "force",
-    "--label",
-    "jar:full",
-    "-o",
-    "classifier.type=none",
-)
+COLUMNS = shlex.split("--time t --gap gap --force force --label jar:full -o classifier.type=none")
 
 
 class Signalled(Scripted):
@@ -237,18 +227,8 @@ def test_ctrl_c_in_features_writes_no_table_of_aborted_grasps(recordings, tmp_pa
 
 def collecting(folder, labels, *options, stream=subprocess.PIPE, **more):
     """Start a collection as a process of its own, with its input, output and errors on this stream."""
-    words = (
-        "collect",
-        "--labels",
-        labels,
-        "--each",
-        "9",
-        "--save",
-        str(folder),
-        "-o",
-        "classifier.type=none",
-    )
-    command = [sys.executable, "-m", "graspsense", *words, *options]
+    words = f"-m graspsense collect --labels {labels} --each 9 -o classifier.type=none --save".split()
+    command = [sys.executable, *words, str(folder), *options]
     return subprocess.Popen(command, stdin=stream, stdout=stream, stderr=stream, **more)
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cases import every_case
-from commands import graspsense, printed, refused
+from commands import graspsense, refused
 from kept import keep, write_recording
 
 from graspsense.core.files.whole_file import SaveFailed
@@ -193,10 +193,3 @@ def test_a_folder_of_calibrations_is_found_below_the_home_and_told_where_it_is_n
     tare = Calibration(kind="tare", serial="L7", device={}, made="2300-01-01T00:00:00", data=data)
     write_calibration(tmp_path / "mine" / "L7" / "tare.json", tare)
     assert calibrations_of("~/mine", "L7", {})["tare"].data == data
-
-
-@pytest.mark.slow
-def test_a_mistyped_folder_of_calibrations_refuses_the_grasp(tmp_path):
-    emulated = ("run", "--gripper", "pr2", "-o", "gripper.transport=emulated", "-o", "classifier.type=none")
-    assert "no such folder" in refused(*emulated, "-o", f"gripper.calibration={tmp_path}/mistyped")
-    assert "uncalibrated" in printed(*emulated, "-o", f"gripper.calibration={tmp_path}")

@@ -37,17 +37,6 @@ def test_defaults_are_j48s_and_presets_are_named():
     assert paper.items() >= expected.items()
 
 
-def test_iris_is_recognised_in_a_pipeline():
-    from sklearn.datasets import load_iris
-    from sklearn.model_selection import cross_val_predict
-    from sklearn.pipeline import make_pipeline
-    from sklearn.preprocessing import StandardScaler
-
-    x, y = load_iris(return_X_y=True)
-    predicted = cross_val_predict(make_pipeline(StandardScaler(), C45Classifier()), x, y, cv=5)
-    assert (predicted == y).mean() > 0.9
-
-
 @every_case(
     "names", [["no", "yes"], [10, 20], [True, False], np.array(["b", "a"], dtype=object), [-1.0, 1.0]]
 )

@@ -73,15 +73,6 @@ def test_same_tree_where_branches_are_raised_and_pruned_again():
     assert raised > 3
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("factor", [1e-300, 1e-12, 1e-10, 1e-9, 1e-7, 1e-3, 0.1, 1e9, 1e140])
-def test_same_tree_for_weights_of_any_size(factor):
-    table = grasps(3, 60, 1, "any")
-    weighted = make_table(table.schema, table.values, table.labels, table.weights * factor)
-    for options in ({}, {"min_objects": 1}, {"criterion": "info_gain", "pruning": "reduced_error"}):
-        same_tree(weighted, options)
-
-
 def nominal_and_missing(seed, missing):
     rng = np.random.default_rng(seed)
     numeric = grasps(seed, 400, 1, "any")
@@ -118,12 +109,6 @@ def test_same_tree_on_the_awkward_sets(path):
         same_tree(table, options)
 
 
-def test_auto_compiles_only_what_pays():
-    chosen = {("plain", 10**9): False, ("auto", 6_000_000): True, ("fast", 1): True}
-
-    assert {case: Fits().choose_fast(*case, True) for case in chosen} == chosen
-
-
 def test_many_small_fits_use_compiled_code_once_the_plain_form_took_as_long(monkeypatch):
     pytest.importorskip("graspsense")
     from graspsense_c45.building import compiled
@@ -138,18 +123,6 @@ def test_many_small_fits_use_compiled_code_once_the_plain_form_took_as_long(monk
             fits.add_plain(1.0)
         assert not fits.choose_fast("plain", 6_000, True)
     assert chosen == {True: [False] + 5 * [True], False: [k >= engines.COMPILING_S for k in range(6)]}
-
-
-@pytest.mark.parametrize("on_disk", [True, False])
-def test_kept_code_is_used_at_once_where_numba_is_imported_anyway(monkeypatch, on_disk):
-    pytest.importorskip("graspsense")
-    from graspsense_c45.building import compiled
-
-    monkeypatch.setattr(compiled, "kept", lambda slim: on_disk)
-    monkeypatch.setitem(sys.modules, "numba", sys)
-    assert Fits().choose_fast("auto", 6_000, True) == on_disk
-    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
-    assert not Fits().choose_fast("auto", 10**9, True)
 
 
 def test_a_tree_of_the_plain_form_counts(monkeypatch):

@@ -52,12 +52,6 @@ def test_estimates_at_the_ends():
         assert weight * 0.3 <= estimated_errors(weight, weight * 0.3, confidence) <= weight + 1e-12
 
 
-def test_least_side_weight_is_a_tenth_of_the_mean_class_within_bounds():
-    # Quinlan's bound of 25 gives way to a larger minimum.
-    cases = ((100.0, 4, 2.0), (100.0, 11, 2.0), (5_000.0, 4, 2.0), (5_000.0, 4, 200.0))
-    assert [criteria.min_side_weight(*case) for case in cases] == pytest.approx([2.5, 2.0, 25.0, 200.0])
-
-
 def best_place(numerators, limits):
     best, taken = 0, -1
     for i, numerator in numerators.items():

@@ -24,7 +24,7 @@ from graspsense_c45 import (
     to_rules,
     to_text,
 )
-from graspsense_c45.branch_words import short, weka_number, weka_weight
+from graspsense_c45.branch_words import weka_number, weka_weight
 
 
 def grasp_tree():
@@ -172,7 +172,3 @@ def test_numbers_as_weka_prints_them():
     numbers = (1.0, -0.25, 1e-9, 80282423097.21323, 2.5e15)
     assert [*map(weka_number, numbers)] == ["1", "-0.25", "0", "80282423097.21323", "2500000000000000"]
     assert [*map(weka_weight, (13.0, 2.125, 0.004, 12345678.0))] == ["13.0", "2.13", "0.0", "1.2345678E7"]
-
-
-def test_short_numbers():
-    assert [short(0.61234), short(0.54200001, 0.542), short(2.0, 2.0)] == ["0.612", "0.54200001", "2"]

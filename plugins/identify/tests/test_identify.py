@@ -1,11 +1,9 @@
 """Identifying an object: a law that made the forces is found again, and what a recording cannot show is refused."""
 
-from functools import partial
-
 import numpy as np
 import pytest
 from attrs import evolve
-from cases import every_case
+from cases import every_case, slow
 from squeezes import DEPTH_M, WIDTH_M, grasped, ready, recorded
 
 from graspsense.plugin_api import ConfigError
@@ -24,7 +22,6 @@ from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.pads import PadCompliance
 from graspsense_sim_gripper.scene.spec import parse_scene
 
-slow = partial(pytest.param, marks=pytest.mark.slow)
 PADS = PadCompliance(15000.0, 0.0, 0.0, 1.0)
 
 

@@ -18,7 +18,7 @@ from graspsense.core.components.setting import declared, setting
 from graspsense.core.values.errors import ConfigError
 from graspsense.evaluation.over_seeds import OverSeeds
 from graspsense.experiments.executors.executor import Serial
-from graspsense.experiments.experiment_file import read_experiment, shipped
+from graspsense.experiments.experiment_file import read_experiment
 from graspsense.experiments.page import experiment_page, findings_of
 from graspsense.experiments.results import EXPERIMENT, Results
 from graspsense.experiments.run import run_experiment
@@ -408,9 +408,3 @@ def test_the_grasps_on_the_page_are_those_of_this_version(tmp_path):
         # Printed to a tenth of a newton and to 1 mm/s, which other processors may round otherwise.
         for here, there in zip(ours[4:], theirs[4:], strict=True):
             assert float(here) == pytest.approx(float(there), abs=0.11 if "." in here else 1.0)
-
-
-@pytest.mark.slow
-def test_every_shipped_experiment_can_be_planned():
-    for name in shipped():
-        assert read_experiment(name, ["seeds=1"]).tasks()

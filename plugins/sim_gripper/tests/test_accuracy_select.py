@@ -1,18 +1,17 @@
 """A model is tried before it is used: levels from large to small tolerances, and a refusal where none suffices."""
 
 import math
-from functools import partial
 from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
 import pytest
 from attrs import evolve, frozen
+from cases import slow
 from random_scenes import record_of
 
 from graspsense.core.grasp.runner import run_grasp
 from graspsense.core.learn.checkpoints import with_checkpoints
-from graspsense.gripper_api import Outcome
 from graspsense.plugin_api import HOLD, Channel, ConfigError, Feature, FeatureSet, create
 from graspsense.simulator_api import RunConfig
 from graspsense_sim_gripper.config import SimConfig
@@ -36,7 +35,6 @@ CONFIG = SimConfig(sensor="ideal", spread=False)
 NEAR = evolve(CONFIG, open_gap_m=0.053, rate_hz=250.0)
 """The fingers close from 3 mm away on what is `made up`, in few ticks."""
 UNSURE = ["peak", "trace", "features"]
-slow = partial(pytest.param, marks=pytest.mark.slow)
 SHELL = ("elastic", {"k1_n_m": 2000.0, "k3_n_m3": 2e6})
 
 
@@ -151,23 +149,6 @@ def test_features_at_checkpoints_are_verified_as_those_of_the_whole_grasp():
     model = selected(NEAR, thing(SHELL), evolve(hybrid(), features=features))
     assert model.verification is not None
     assert model.not_verified == ()
-
-
-@pytest.mark.slow
-def test_the_expected_force_is_that_of_the_controller():
-    spec = thing(SHELL)
-    slow, fast = (
-        selected(CONFIG, spec, hybrid(closing_speed_m_s=v, probing_force_n=f))
-        for v, f in ((0.01, 10.0), (0.04, 40.0))
-    )
-    assert fast.force_n > 2.0 * slow.force_n
-
-
-@pytest.mark.slow
-def test_a_slow_approach_is_taken_up_near_the_object(monkeypatch):
-    monkeypatch.setattr(verify, "MAX_SECONDS", 4.0)
-    model = selected(CONFIG, thing(SHELL), hybrid(closing_speed_m_s=0.002))
-    assert model.verification is not None
 
 
 @pytest.mark.slow
@@ -287,24 +268,6 @@ def test_a_step_per_tick_is_chosen_where_it_is_accurate_enough_and_not_where_it_
         # Steps without an estimate of their error are valid for the forces that were tried.
         assert model.valid_for(model.force_n)
         assert not model.valid_for(10.0 * model.force_n)
-
-
-def test_forced_steps_and_contacts_beyond_the_tick_are_not_verified():
-    assert selected(evolve(CONFIG, step_s=1e-4), thing(SHELL), hybrid()).verification is None
-    hard = selected(evolve(CONFIG, pad_stiffness_n_m=math.inf), thing(("elastic", {"k1_n_m": 1e9})), hybrid())
-    assert (hard.unresolved, hard.verification) == (("trace", "features"), None)
-
-
-class Failing(type(create("controller", "hybrid"))):
-    @staticmethod
-    def step(params, state, reading):
-        raise RuntimeError("out of order")
-
-
-def test_a_controller_that_fails_is_still_an_outcome():
-    grasp = run_grasp(SimBackend(CONFIG), Failing(hybrid().controller.config), RunConfig())
-    assert grasp.outcome == Outcome.ABORTED
-    assert "out of order" in grasp.reason
 
 
 def test_gas_that_is_spent_is_reported():

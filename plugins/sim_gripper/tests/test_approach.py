@@ -1,15 +1,13 @@
 """Ticks of an approach that are run at once give what the same ticks give one by one, with the encoder's noise too."""
 
-from functools import partial
-
 import numpy as np
 import pytest
 from batches import run_many
+from cases import slow
 
 from graspsense.plugin_api import APPROACH, create
 from graspsense_sim_gripper.config import SimConfig
 
-slow = partial(pytest.param, marks=pytest.mark.slow)
 TICK_BY_TICK = {"fidelity": "fixed"}
 HYBRID = create("controller", "hybrid")
 RINGING = create("controller", "hybrid", velocity_gain_n_s_m=1500.0, integral_gain_n_m=1e5)

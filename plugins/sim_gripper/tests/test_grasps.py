@@ -1,10 +1,9 @@
 """Whole grasps that the paper and its authors' notes speak of: what must come out, and by how much."""
 
-from functools import partial
-
 import numpy as np
 import pytest
 from batches import run_many
+from cases import slow
 
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.runner import run_grasp
@@ -14,7 +13,6 @@ from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.backend import SimBackend
 
 FEATURES = create("feature-set", "chitta")
-slow = partial(pytest.param, marks=pytest.mark.slow)
 
 
 def grasp(controller, seed=0, **config):

@@ -1,11 +1,12 @@
 """The plant: a true stuck state, the balance of forces, energy, and the estimates it has to agree with."""
 
 import math
-from functools import cache, partial
+from functools import cache
 from math import inf
 
 import numpy as np
 import pytest
+from cases import slow
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -34,7 +35,6 @@ from graspsense_sim_gripper.scene.terms.term import NoState
 from graspsense_sim_gripper.scene.terms.worn import Worn
 from graspsense_sim_gripper.solve.scheme import PlantParams, PlantState, Steps
 
-slow = partial(pytest.param, marks=pytest.mark.slow)
 LINK = LINKAGES["pr2"]
 TICK = 1e-3
 FINE = Steps(2e-5)

@@ -68,14 +68,6 @@ def test_numbers_have_their_distributions(seed):
     assert np.abs(lagged).max() < 7e-3
 
 
-@pytest.mark.slow
-def test_grasps_of_neighbouring_seeds_are_independent():
-    rows = np.array([drawn(draw_normals, seed, 52) for seed in range(2000)])
-    assert scipy.stats.kstest(rows[:, 0], "norm").pvalue > 1e-3
-    off_diagonal = np.corrcoef(rows.T) - np.eye(52)
-    assert np.abs(off_diagonal).max() < 0.11
-
-
 @given(SEEDS, st.integers(0, 50), st.integers(1, 60))
 def test_the_noise_of_an_image_is_the_same_whatever_is_drawn_with_it(seed, begin, count):
     rows = image_noise(key_of(seed), begin, count)

@@ -8,7 +8,7 @@ from cases import every_case
 
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.runner import run_grasp
-from graspsense.gripper_api import Outcome, Phase, revolutions_at
+from graspsense.gripper_api import Phase, revolutions_at
 from graspsense.plugin_api import create
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.drive_models import ENCODER_TICKS, LINKAGES
@@ -106,15 +106,6 @@ def test_the_ideal_sensor_sees_contact_when_it_happens_the_pads_up_to_an_image_l
     # tau_1 is met on the cells when a bottle's 42 % share of the force has grown that far: some 30 ms later still.
     assert 0.0 < min(delays) < 0.060
     assert max(delays) - min(delays) == pytest.approx(0.041, abs=0.008)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("rate_hz", [100.0, 400.0, 5000.0])
-def test_other_tick_rates_feel_the_same_bottle(rate_hz):
-    bottle = {"object": "can:empty_open", "spread": False, "sensor": "ideal", "open_gap_m": 0.07}
-    result, expected = grasp(rate_hz=rate_hz, **bottle), grasp(**bottle)
-    assert result.outcome is Outcome.STEADY
-    assert result.report["true_peak_force_n"] == pytest.approx(expected.report["true_peak_force_n"], rel=0.05)
 
 
 def test_cells_that_are_not_there_read_their_offset_and_the_others_as_before():

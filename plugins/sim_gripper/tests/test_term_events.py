@@ -5,13 +5,12 @@ from __future__ import annotations
 import json
 import math
 import re
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 import pytest
 from batches import run_many
-from cases import every_case
+from cases import every_case, slow
 from click.testing import CliRunner
 from unverified import unverified_setup
 
@@ -23,8 +22,6 @@ from graspsense_sim_gripper.scene.spec import ObjectSpec
 from graspsense_sim_gripper.scene.terms import Term
 from graspsense_sim_gripper.scene.terms.registry import TERMS
 from graspsense_sim_gripper.solve.scheme import Steps
-
-slow = partial(pytest.param, marks=pytest.mark.slow)
 
 
 def scene_of(*terms, **more):
