@@ -15,14 +15,14 @@ from graspsense.cli.live import Live, LiveOptions, live_options, shown_live
 from graspsense.cli.options import force_option, keys_option
 from graspsense.cli.output import echo_found, echo_values, file_to_write, json_option
 from graspsense.cli.progress import ProgressLine
-from graspsense.cli.terminal import Style, echo, echo_entry, echo_table, talk
+from graspsense.cli.terminal import Style, echo, echo_entry, echo_rows, talk
 from graspsense.core.files.whole_file import SaveFailed
 from graspsense.core.values.errors import ExitCode, counted
 from graspsense.evaluation.intervals import percent, percentages
 from graspsense.report.write import write_html
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Mapping
 
     from graspsense.experiments.duration import Effort
     from graspsense.experiments.executors.executor import Executor
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from graspsense.experiments.findings import Findings
     from graspsense.experiments.results import Results
     from graspsense.experiments.run import Account
-    from graspsense.experiments.summary import Summary
+    from graspsense.experiments.summary import ConditionResult, Summary
 
 _MOST_NAMED = 8
 
@@ -167,11 +167,13 @@ def _list(known: Iterable[str]) -> None:
             for name, experiment in planned.items()
         ]
     )
-    rows = [
-        (name, efforts[name].time_on(cores), str(efforts[name].tasks), experiment.experiment.title)
-        for name, experiment in planned.items()
-    ]
-    echo_table(("EXPERIMENT", "TIME", "TASKS", "WHAT"), rows)
+    columns: Mapping[str, Callable[[str], str]] = {
+        "EXPERIMENT": str,
+        "TIME": lambda name: efforts[name].time_on(cores),
+        "TASKS": lambda name: str(efforts[name].tasks),
+        "WHAT": lambda name: planned[name].experiment.title,
+    }
+    echo_rows(planned, columns)
     echo(f"\nTIME is for {cores} cores, {ESTIMATED_FROM}.")
     echo(
         "The first experiment after an installation compiles the simulator as well, about a minute in each process."
@@ -243,18 +245,15 @@ def _print(summary: Summary, more: Findings | None, account: Account, page: str)
 
 
 def _print_rates(summary: Summary) -> None:
-    rows = [
-        (
-            condition.name or "-",
-            condition.target,
-            percent(condition.rate.mean),
-            percentages(condition.rate.interval),
-            condition.protocol,
-        )
-        for condition in summary.conditions
-    ]
-    if rows:
-        echo_table(("CASE", "TARGET", "RATE", "95 %", "PROTOCOL"), rows)
+    columns: Mapping[str, Callable[[ConditionResult], str]] = {
+        "CASE": lambda condition: condition.name or "-",
+        "TARGET": lambda condition: condition.target,
+        "RATE": lambda condition: percent(condition.rate.mean),
+        "95 %": lambda condition: percentages(condition.rate.interval),
+        "PROTOCOL": lambda condition: condition.protocol,
+    }
+    if summary.conditions:
+        echo_rows(summary.conditions, columns)
         echo()
     _print_doubts(summary)
 

@@ -20,7 +20,7 @@ from graspsense.cli.terminal import (
     echo,
     echo_entries,
     echo_entry,
-    echo_table,
+    echo_rows,
     prediction_style,
     state_style,
     talk,
@@ -421,18 +421,17 @@ def _say_what_would_be_done(settings: Settings) -> None:
         echo(f"commands: not rehearsed, {why_not}")
     else:
         echo(f"would command, as rehearsed on {rehearsed.device} ({rehearsed.outcome}):")
-        rows = [
-            (
-                phase.phase,
-                ", ".join(phase.kinds) or "none",
-                f"{phase.seconds:.2f} s",
-                effort_words(phase.kinds, phase.least_n, phase.most_n),
-                f"{phase.fastest_m_s * 1e3:.0f} mm/s",
-                f"{phase.limited} limited" if phase.limited else "",
-            )
-            for phase in rehearsed.phases
-        ]
-        echo_table(("PHASE", "COMMAND", "FOR", "EFFORT (+ squeezes)", "FASTEST", "BY THE GUARD"), rows)
+        echo_rows(
+            rehearsed.phases,
+            {
+                "PHASE": lambda phase: phase.phase,
+                "COMMAND": lambda phase: ", ".join(phase.kinds) or "none",
+                "FOR": lambda phase: f"{phase.seconds:.2f} s",
+                "EFFORT (+ squeezes)": lambda phase: effort_words(phase.kinds, phase.least_n, phase.most_n),
+                "FASTEST": lambda phase: f"{phase.fastest_m_s * 1e3:.0f} mm/s",
+                "BY THE GUARD": lambda phase: f"{phase.limited} limited" if phase.limited else "",
+            },
+        )
         if not any(phase.seconds for phase in rehearsed.phases):
             echo("the emulated gripper was commanded nothing: this rehearsal shows nothing of the real one")
     echo("nothing was opened")

@@ -19,11 +19,12 @@ from contextlib import contextmanager, nullcontext, redirect_stdout
 from enum import Enum
 from functools import partial
 from io import StringIO
-from typing import IO, Final
+from typing import IO, Final, TypeVar
 from unicodedata import combining, east_asian_width
 
 import click
 
+from graspsense.core.values.errors import suggestion
 from graspsense.core.values.printable import in_one_line, printable
 
 
@@ -54,6 +55,7 @@ _NUMBER: Final = re.compile(r"[+−-]?[0-9]+([.][0-9]+)?( ?[%\w/]{1,4})?")
 _GOOD: Final = frozenset({"loaded", "ready", "pass", "ok", "steady", "yes"})
 _BAD: Final = frozenset({"broken", "fail", "failed", "problem", "PROBLEM", "aborted", "device lost", "no"})
 
+ItemT = TypeVar("ItemT")
 StyleOf = Callable[[str], Style | None]
 """Returns the style of a cell with this text."""
 
@@ -235,6 +237,15 @@ def echo_table(
                     echo_entry(f"  {name}", cell, style(cell), width=wide)
 
 
+def echo_rows(
+    items: Iterable[ItemT],
+    columns: Mapping[str, Callable[[ItemT], str]],
+    styles: Mapping[str, StyleOf] | None = None,
+) -> None:
+    """Print a table with one row for each item; `columns` tells the text below each header."""
+    echo_table(tuple(columns), [[text(item) for text in columns.values()] for item in items], styles)
+
+
 def _lines(text: str) -> list[str]:
     """Return the lines of one text: those after the first are indented deeper, so that none looks like another text."""
     lines = printable(text).split("\n")
@@ -330,6 +341,15 @@ def _shown_width(text: str) -> int:
 
 class Subcommands(click.Group):
     """A group whose help has the whole first sentence of each subcommand; click cuts it to one line."""
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Return a subcommand. Raises UsageError for one that there is not."""
+        command = super().get_command(ctx, cmd_name)
+        if command is None and not ctx.resilient_parsing and not cmd_name.startswith("-"):
+            known = ", ".join(self.commands)
+            near = suggestion(cmd_name, self.commands)
+            raise click.UsageError(f"no subcommand named {cmd_name!r}. Known: {known}.{near}", ctx)
+        return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the list of subcommands for the help."""

@@ -62,6 +62,7 @@ def read_experiment(
     for option in layers:
         merged.add((), _located(option.values, Path()), option)
     values = merged.values
+    layer = evolve(layer, options={typed_path(option): option.typed for option in layers})
     try:
         experiment = structured(values, Experiment, "an experiment")
     except ValidationFailed as misfit:
