@@ -91,7 +91,7 @@ def identify(
     if page:
         from graspsense.report.identification import identification_page
 
-        write_html(Path(page), identification_page(result, Path(out).name))
+        write_html(Path(page), identification_page(result, "" if refused else Path(out).name))
     for note in result.notes:
         talk(f"note: {note}")
     echo_values(_as_values(None if refused else out, result))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from difflib import get_close_matches
@@ -26,7 +25,7 @@ def advice(error: BaseException, arguments: Sequence[str]) -> list[str]:
         advised.append("Free some space, or write to another disk")
     context = getattr(error, "ctx", None)
     if not advised and isinstance(error, click.UsageError) and context is not None:
-        advised = list(_misplaced_words(context, error.message))
+        advised = list(_misplaced_words(context, arguments))
     return advised
 
 
@@ -65,17 +64,23 @@ def _split_options(arguments: Sequence[str]) -> Iterator[str]:
             yield f"Write -o {key.rstrip('=')}={value.removeprefix('=')}, without a space"
 
 
-def _misplaced_words(context: click.Context, message: str) -> Iterator[str]:
-    """Yield the option for each word that click calls an extra argument, but may be the value of an option."""
-    params = context.command.params
-    options = {name for param in params if isinstance(param, click.Option) for name in param.opts}
-    extra = re.fullmatch(r"Got unexpected extra arguments? \((.*)\)", message)
-    for word in extra[1].split() if extra else ():
-        option, value = _option_for(word)
-        if option == "--object" and "--labels" in options:
-            option = "--labels"
-        if option in options and word[:1].isalpha():
-            yield f"Write {option} {value}"
+def _misplaced_words(context: click.Context, arguments: Sequence[str]) -> Iterator[str]:
+    """Yield the option for each word that is no argument of the command, but may be the value of an option."""
+    command = context.command
+    options = {name for param in command.params if isinstance(param, click.Option) for name in param.opts}
+    words = (
+        list(arguments[arguments.index(str(context.info_name)) + 1 :])
+        if context.info_name in arguments
+        else []
+    )
+    with suppress(click.UsageError):
+        _, left, _ = command.make_parser(context).parse_args(words)
+        for word in left:
+            option, value = _option_for(word)
+            if option == "--object" and "--labels" in options:
+                option = "--labels"
+            if option in options and word[:1].isalpha():
+                yield f"Write {option} {value}"
 
 
 def _option_for(word: str) -> tuple[str, str]:
