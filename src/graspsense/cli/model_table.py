@@ -12,7 +12,17 @@ MOST_CHANGES: Final = 4
 """Features whose changes are listed for a term; of the others there is only the number."""
 
 
-def print_model(model: Mapping[str, Any]) -> None:
+def print_report(report: Mapping[str, Any]) -> None:
+    """Print what a simulated gripper reports of its model: what is not verified, and where asked for, its terms."""
+    _print_not_verified(report)
+    if "model" in report:
+        _print_model(report["model"])
+        if "selection" in report:
+            print_without(report["model"].get("without", ()), report["selection"]["accuracy"])
+            _print_selection(report["selection"])
+
+
+def _print_model(model: Mapping[str, Any]) -> None:
     """Print what a simulated gripper reports as `model`: one row a term."""
     echo()
     if not model["touched"]:
@@ -69,7 +79,7 @@ def _change(name: str, effect: Mapping[str, Any]) -> str:
     return f"{name} is no longer defined" if effect["without"] is None else f"{name} becomes defined"
 
 
-def print_not_verified(report: Mapping[str, Any]) -> None:
+def _print_not_verified(report: Mapping[str, Any]) -> None:
     """Print for which quantities a simulated gripper does not guarantee its accuracy, if any, and an unstable loop."""
     if report.get("unstable_loop"):
         echo_entry("simulation", report["unstable_loop"])
@@ -82,7 +92,7 @@ def print_not_verified(report: Mapping[str, Any]) -> None:
         echo_entry("simulation", f"its accuracy is not verified for: {', '.join(names)} ({why})")
 
 
-def print_selection(selection: Mapping[str, Any]) -> None:
+def _print_selection(selection: Mapping[str, Any]) -> None:
     """Print what a simulated gripper reports as `selection`: the steps of the grasp, and what verified them."""
     echo()
     level, verified = selection["level"], selection["verified"]

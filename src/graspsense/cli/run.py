@@ -11,7 +11,7 @@ import click
 
 from graspsense.cli.live import LiveOptions, live_options, shown_live, viewer_options
 from graspsense.cli.live_rows import LiveRows
-from graspsense.cli.model_table import print_model, print_not_verified, print_selection, print_without
+from graspsense.cli.model_table import print_report
 from graspsense.cli.options import contradiction, names_object, pipeline_options, plot_option, settings_of
 from graspsense.cli.output import echo_values, json_option
 from graspsense.cli.terminal import (
@@ -147,7 +147,7 @@ def run(
         echo_values(_as_json(trial, kept))
         print_trial(trial)
         _print_better(settings, trial)
-        _print_model(trial)
+        print_report(trial.report)
         if plot is not None:
             draw_grasp(trial, Path(plot))
         _write_film(film, save, kept)
@@ -228,16 +228,6 @@ def _print_better(settings: Settings, trial: Trial) -> None:
             "better",
             f"this pipeline is {entry.name}; {entry.better} recognises more: --pipeline {entry.better}",
         )
-
-
-def _print_model(trial: Trial) -> None:
-    """Print what is known of the simulator's model: what is not verified, and where asked for, its terms."""
-    print_not_verified(trial.report)
-    if "model" in trial.report:
-        print_model(trial.report["model"])
-        if "selection" in trial.report:
-            print_without(trial.report["model"].get("without", ()), trial.report["selection"]["accuracy"])
-            print_selection(trial.report["selection"])
 
 
 def _settings_to_run(
