@@ -104,7 +104,10 @@ def run(monkeypatch, tmp_path):
         ("experiment ex.toml -o data.objects=[] --dry-run", "-o data.objects=[]: an empty list"),
         ("experiment ex.toml -o controller.probing_force_n=18 --dry-run", "sweep.controller.probing_force_n"),
         ("experiment ex.toml -o run.seed=3 --dry-run", "-o run.seed=3: "),
-        ("compare table.csv --label what --classifiers c45,graspsense-c45/c45", "graspsense-c45/c45 are the same"),
+        (
+            "compare table.csv --label what --classifiers c45,graspsense-c45/c45",
+            "graspsense-c45/c45 are the same",
+        ),
         ("evaluate table.csv --label what --order nope", "(the order)"),
         ("predict default table.csv --features a", "--features"),
         ("config shw", "'show'"),
