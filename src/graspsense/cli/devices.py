@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-
 import attrs
 import click
 
 from graspsense.cli.options import time_range
 from graspsense.cli.output import echo_values, json_option
-from graspsense.cli.terminal import echo, echo_rows, state_style, talk
-from graspsense.core.components.entries import FoundDevice
+from graspsense.cli.terminal import echo, echo_table, state_style, talk
 from graspsense.core.components.registry import installed
 
 
@@ -34,14 +31,17 @@ def devices(timeout_s: float) -> None:
     listed = [{**attrs.asdict(device), "distribution": distribution} for distribution, device in devices]
     echo_values({"devices": listed, "looked": [probe.distribution for probe in probes], "failed": failed})
     if devices:
-        columns: Mapping[str, Callable[[FoundDevice], str]] = {
-            "GRIPPER": lambda device: device.backend,
-            "SERIAL": lambda device: device.serial or "-",
-            "WHERE": lambda device: device.where,
-            "STATE": lambda device: "ready" if device.ready else "not ready",
-            "ADVICE": lambda device: device.advice,
-        }
-        echo_rows([device for _, device in devices], columns, {"STATE": state_style})
+        rows = [
+            (
+                device.backend,
+                device.serial or "-",
+                device.where,
+                "ready" if device.ready else "not ready",
+                device.advice,
+            )
+            for _, device in devices
+        ]
+        echo_table(("GRIPPER", "SERIAL", "WHERE", "STATE", "ADVICE"), rows, {"STATE": state_style})
     elif probes:
         echo(f"no device found by {', '.join(probe.distribution for probe in probes)}")
     else:

@@ -16,7 +16,7 @@ from graspsense.cli.live import Live, LiveOptions, live_options, shown_live
 from graspsense.cli.options import force_option, keys_option
 from graspsense.cli.output import echo_found, echo_values, file_to_write, json_option
 from graspsense.cli.progress import ProgressLine
-from graspsense.cli.terminal import Style, echo, echo_entries, echo_entry, echo_rows, talk
+from graspsense.cli.terminal import Style, echo, echo_entries, echo_entry, echo_rows, echo_table, talk
 from graspsense.core.files.whole_file import SaveFailed
 from graspsense.core.values.errors import ExitCode, counted
 from graspsense.evaluation.intervals import percent, percentages
@@ -168,13 +168,11 @@ def _list(known: Iterable[str]) -> None:
             for name, experiment in planned.items()
         ]
     )
-    columns: Mapping[str, Callable[[str], str]] = {
-        "EXPERIMENT": str,
-        "TIME": lambda name: efforts[name].time_on(cores),
-        "TASKS": lambda name: str(efforts[name].tasks),
-        "WHAT": lambda name: planned[name].experiment.title,
-    }
-    echo_rows(planned, columns)
+    rows = [
+        (name, efforts[name].time_on(cores), str(efforts[name].tasks), experiment.experiment.title)
+        for name, experiment in planned.items()
+    ]
+    echo_table(("EXPERIMENT", "TIME", "TASKS", "WHAT"), rows)
     echo(f"\nTIME is for {cores} cores, {ESTIMATED_FROM}.")
     echo(
         "The first experiment after an installation compiles the simulator as well, about a minute in each process."

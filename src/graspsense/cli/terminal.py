@@ -24,7 +24,6 @@ from unicodedata import combining, east_asian_width
 
 import click
 
-from graspsense.core.values.errors import suggestion
 from graspsense.core.values.printable import in_one_line, printable
 
 
@@ -341,15 +340,6 @@ def _shown_width(text: str) -> int:
 
 class Subcommands(click.Group):
     """A group whose help has the whole first sentence of each subcommand; click cuts it to one line."""
-
-    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Return a subcommand. Raises UsageError for one that there is not."""
-        command = super().get_command(ctx, cmd_name)
-        if command is None and not ctx.resilient_parsing and not cmd_name.startswith("-"):
-            known = ", ".join(self.commands)
-            near = suggestion(cmd_name, self.commands)
-            raise click.UsageError(f"no subcommand named {cmd_name!r}. Known: {known}.{near}", ctx)
-        return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the list of subcommands for the help."""

@@ -42,11 +42,6 @@ The pipelines of the parts stand in the file that a folder of results keeps.
 """
 
 
-_OF_PARTS: Final = (
-    "an experiment of parts has no cases of its own, so this has no effect: set it in the parts"
-)
-
-
 def read_experiment(
     asked: str, options: Sequence[str] = (), within: Sequence[str] = (), *, force: bool = False
 ) -> Planned:
@@ -81,7 +76,8 @@ def read_experiment(
     without = Experiment(title="")
     for key in OF_CASES if experiment is not None and experiment.parts else ():
         if getattr(experiment, key) != getattr(without, key):
-            complaints.append(layer.complain(InvalidValue((key,), _OF_PARTS)))
+            text = "an experiment of parts has no cases of its own: set it in the parts"
+            complaints.append(layer.complain(InvalidValue((key,), text)))
     if experiment is None or complaints:
         raise ConfigError("\n".join(complaints))
     if experiment.parts:
