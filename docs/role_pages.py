@@ -12,7 +12,7 @@ import enum
 import inspect
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import partial
 from importlib import import_module
 from importlib.resources import files
@@ -74,7 +74,7 @@ HELPERS = {
     ),
 }
 GRIPPER_EXAMPLE = (
-    "- [A gripper on a network socket](../tcp_gripper.md) has an example with a fake server, the options of the "
+    "\n- [A gripper on a network socket](../tcp_gripper.md) has an example with a fake server, the options of the "
     "conformance checks, and what to do with a gripper that closes by itself, or has one force sensor or none."
 )
 FASTER: dict[str, tuple[str, str, Any, tuple[str, ...]]] = {
@@ -90,55 +90,55 @@ FLOWING = (
 )
 EXAMPLE = "\n\nExample::\n\n"
 """What stands before the example in the docstring of a hook."""
-HEAD = "<!-- Written by docs/role_pages.py from the code: change that. -->\n"
+HEAD = "<!-- Written by docs/role_pages.py from the code: change that. -->"
+
+
+def _text_of_page(blocks: Sequence[str]) -> str:
+    """Return the text of a page: blocks, as all functions here return them, with an empty line between."""
+    return f"{HEAD}\n" + "\n\n".join(blocks) + "\n"
+
+
+def _table(header: str, rows: Iterable[str]) -> str:
+    """Return the block of a table."""
+    return "\n".join([header, "|---" * (header.count("|") - 1) + "|", *rows])
 
 
 def _fields_section(name: str) -> list[str]:
     """Return the section on a class of values: its fields and its meaning."""
-    return [f"## {name}", "", f"    {_fields_of(public(name))}", "", _text(public(name)), ""]
+    return [f"## {name}", f"    {_fields_of(public(name))}", _text(public(name))]
 
 
 def dataset_page() -> str:
     """Return the page of a reader of a data set, which is a function and no component."""
-    return "\n".join(
+    return _text_of_page(
         [
-            HEAD + f"# {TITLES['dataset']}",
-            "",
+            f"# {TITLES['dataset']}",
             "This page describes readers of recorded grasps. A manifest ([import](../import.md)) describes most files "
             "without any code. A reader is for files that a manifest cannot describe.",
-            "",
             "A reader is a function `recordings(folder)` that yields a `LabelledRecording` for each grasp. With the "
             "name of its entry, the data set can be",
-            "",
-            "- evaluated: `graspsense evaluate NAME:FOLDER`;",
-            "- imported into a store, with its recordings: `graspsense import NAME:FOLDER --save DIR`;",
-            "- looked at before: `graspsense import NAME:FOLDER --check`;",
+            "- evaluated: `graspsense evaluate NAME:FOLDER`;\n"
+            "- imported into a store, with its recordings: `graspsense import NAME:FOLDER --save DIR`;\n"
+            "- looked at before: `graspsense import NAME:FOLDER --check`;\n"
             "- replayed grasp by grasp: `graspsense replay NAME:FOLDER#3`, or `gripper.recording=NAME:FOLDER#3` of the "
             "gripper `replay`.",
-            "",
             "`graspsense plugins new NAME --role dataset` creates a package to start from: the example below. The hook "
             "[graspsense_datasets](hooks.md#graspsense_datasets) declares readers.",
-            "",
             "A reader that raises an exception ends its data set: the recordings before are used, and the error is "
             "told. `each_readable` reads one file, and yields an `UnreadableRecording` in its place if that fails, so "
             "that the reader goes on with the next one. Whatever the file makes a library raise becomes an error that "
             "names the file.",
-            "",
             "`graspsense plugins check DISTRIBUTION --data NAME=FOLDER` (in a test `parametrize_checks(DISTRIBUTION, "
             "data={NAME: FOLDER})`) reads the sound examples in this folder twice, which must give the same, and then "
             "with an empty file and with a word in each column: the error must name the file and the column.",
-            "",
             *_fields_section("LabelledRecording"),
             *_fields_section("Recording"),
             *_fields_section("GraspColumns"),
             f"`checked_recording(columns)`: {_text(public('checked_recording'))}",
-            "",
             *_fields_section("StoredGrasp"),
             "## Fields of the entry",
-            "",
             *_entry(entries.DatasetEntry),
             "## Complete example",
-            "",
             *_example("dataset"),
         ]
     )
@@ -148,87 +148,74 @@ def page(role: str) -> str:
     """Return the page of a role."""
     if role == "dataset":
         return dataset_page()
-    lines = [HEAD + f"# {TITLES[role]}", ""]
+    blocks = [f"# {TITLES[role]}"]
     if role != "distribution":
         kind = entries.ROLES[role]  # type: ignore[index]
         base = public(kind.entry.__name__.removesuffix("Entry"))
-        lines += [
+        blocks += [
             f"This page describes the role `{role}`. A component of this role is selected in the table "
             f"`[{kind.table}]` of a pipeline file.",
-            "",
-            f"- `graspsense plugins new NAME --role {role}` creates a package to start from: the example below.",
-            "- `graspsense plugins check NAME` checks whether a component conforms to the role.",
-            "- [The tutorial](../tutorial.md) creates a package by hand.",
-            "- [Values and units](signals.md) describes the values that pass between components.",
-            "- [Helpers](helpers.md) describes the functions and constants that a component is written with.",
-            f"- The hook [{kind.hook}](hooks.md#{kind.hook}) declares components of this role.",
-            *((GRIPPER_EXAMPLE,) if role == "sensor-backend" else ()),
-            "",
+            f"- `graspsense plugins new NAME --role {role}` creates a package to start from: the example below.\n"
+            "- `graspsense plugins check NAME` checks whether a component conforms to the role.\n"
+            "- [The tutorial](../tutorial.md) creates a package by hand.\n"
+            "- [Values and units](signals.md) describes the values that pass between components.\n"
+            "- [Helpers](helpers.md) describes the functions and constants that a component is written with.\n"
+            f"- The hook [{kind.hook}](hooks.md#{kind.hook}) declares components of this role."
+            + GRIPPER_EXAMPLE
+            * (role == "sensor-backend"),
             *_attributes(base, kind.declared),
             "## Methods",
-            "",
             f"`graspsense.plugin_api.{base.__name__}`: {_text(base)}",
-            "",
             *_methods(base),
             *(_many() if role == "sensor-backend" else ()),
             *(_faster(*FASTER[role]) if role in FASTER else ()),
             "## Fields of the entry",
-            "",
             *_entry(kind.entry),
             "## Complete example",
-            "",
             *_example(role),
         ]
     else:
-        lines += [
+        blocks.append(
             "`graspsense plugins check DISTRIBUTION` checks the distribution itself before its components. It builds "
-            "an editable installation as a wheel, to verify that the wheel is complete.",
-            "",
-        ]
-    lines += [
+            "an editable installation as a wheel, to verify that the wheel is complete."
+        )
+    rows = (f"| `{check.id}` | {_cell(check.title)} |" for check in CHECKS[role])
+    blocks += [
         "## Conformance checks",
-        "",
         f"There are {len(CHECKS[role])} checks. One that does not apply is skipped, with a reason.",
-        "",
-        "| check | requirement |",
-        "|---|---|",
-        *(f"| `{check.id}` | {_cell(check.title)} |" for check in CHECKS[role]),
-        "",
+        _table("| check | requirement |", rows),
     ]
-    return "\n".join(lines)
+    return _text_of_page(blocks)
 
 
 def signals_page() -> str:
     """Return the page of the values that pass between the parts."""
-    lines = [HEAD + "# Values and units", "", _text(signals), ""]
+    blocks = ["# Values and units", _text(signals)]
     for name in FLOWING:
-        lines += [*_fields_section(name), *_documented_fields(public(name))]
-    lines += ["## Channels", "", "| channel | unit |", "|---|---|"]
-    lines += [f"| `{name}` | {unit} |" for name, unit in signals.CHANNELS.items()]
-    return "\n".join([*lines, ""])
+        blocks += [*_fields_section(name), *_documented_fields(public(name))]
+    rows = (f"| `{name}` | {unit} |" for name, unit in signals.CHANNELS.items())
+    return _text_of_page([*blocks, "## Channels", _table("| channel | unit |", rows)])
 
 
 def hooks_page() -> str:
     """Return the page of every hook and of what it gives."""
-    lines = [HEAD + "# Hook reference", ""]
-    lines += [
+    blocks = [
+        "# Hook reference",
         "This page has every hook: its signature, an example, and the fields of the entries that it returns. "
         "[Hooks](../hooks.md) has the rules. A module of hooks also says `GRASPSENSE_API = (2, 0)`.",
-        "",
         "An observer (`graspsense_run_starting`, `graspsense_grasp_event`, `graspsense_run_finished`) is called a few "
         "times in a grasp. It cannot change the run. An exception in it does not stop the grasp; it is reported once, "
         "as a warning of the logger `graspsense.plugins`.",
-        "",
     ]
     specs = {name: spec for name, spec in vars(hookspecs).items() if name.startswith("graspsense_")}
     for name, spec in specs.items():
         signature = f"{name}{inspect.signature(spec)}".replace("'", "")
-        lines += [f"## {name}", "", f"    {signature}", "", _text(spec).partition(EXAMPLE)[0], ""]
-        lines += ["```python", hook_example(spec), "```", ""]
+        blocks += [f"## {name}", f"    {signature}", _text(spec).partition(EXAMPLE)[0]]
+        blocks.append(f"```python\n{hook_example(spec)}\n```")
         given = re.search(r"Iterable\[(\w+)\]", signature)
         if given:
-            lines += _entry(getattr(entries, given[1]))
-    return "\n".join(lines)
+            blocks += _entry(getattr(entries, given[1]))
+    return _text_of_page(blocks)
 
 
 def hook_example(spec: Any) -> str:
@@ -249,12 +236,11 @@ def hook_example(spec: Any) -> str:
 
 def terms_page() -> str:
     """Return the page of the terms of a simulated object, and of what declares one."""
-    lines = [HEAD + "# Terms of a simulated object", ""]
-    lines += [
+    blocks = [
+        "# Terms of a simulated object",
         "The force of an object is the sum of its terms. A term of a [scene](../simulator.md#a-scene-of-your-own) has "
         "a `type` and the parameters below, in the SI units that their names end with; those with a value may be left "
         "out. d is the compression in metres.",
-        "",
     ]
     for name, kind in TERMS.items():
         parameters = (
@@ -262,54 +248,44 @@ def terms_page() -> str:
             + (f" ({kind.params._field_defaults[key]:g})" if key in kind.params._field_defaults else "")
             for key in kind.params._fields
         )
-        lines += [f"## {name}", "", _text(kind.params), "", f"Parameters: {', '.join(parameters)}.", ""]
-        lines += _documented_fields(kind.params)
-    lines += [
+        blocks += [f"## {name}", _text(kind.params), f"Parameters: {', '.join(parameters)}."]
+        blocks += _documented_fields(kind.params)
+    blocks += [
         "## Term",
-        "",
         "[A term of your own](../simulator.md#a-term-of-your-own) is declared by these fields.",
-        "",
         f"    {_fields_of(Term)}",
-        "",
         _text(Term),
-        "",
         *_documented_fields(Term),
     ]
-    return "\n".join(lines)
+    return _text_of_page(blocks)
 
 
 def helpers_page() -> str:
     """Return the page of the functions and constants of `plugin_api` that a component is written with."""
-    lines = [
-        HEAD + "# Helpers",
-        "",
+    blocks = [
+        "# Helpers",
         "These functions and constants are for use in components and their tests. The "
         "features and controllers of graspsense use the same functions, so that all of them agree on contact and rest. "
         "They are in `graspsense.plugin_api` unless another module is named.",
-        "",
     ]
     for title, names in HELPERS.items():
-        lines += [f"## {title}", ""]
+        blocks.append(f"## {title}")
         constants = [name for name in names if not callable(public(name))]
         if constants:
-            lines += ["| constant | value | meaning |", "|---|---|---|"]
-            lines += [_constant(name) for name in constants]
-            lines.append("")
+            blocks.append(_table("| constant | value | meaning |", map(_constant, constants)))
         for name in names:
             if name not in constants:
-                lines += _helper(name)
-    return "\n".join(lines)
+                blocks += _helper(name)
+    return _text_of_page(blocks)
 
 
 def _helper(name: str) -> list[str]:
     """Return the section on one function or named tuple: signature, meaning and example."""
     helper = public(name)
     door = DOOR_OF[name]
-    home = [] if door is plugin_api else [f"It is in `{door.__name__}`.", ""]
-    return [
-        *(f"### {name}", "", f"    {name}{_signature(helper)}", "", *home),
-        *(*_meaning(helper), *_docstring_example(helper)),
-    ]
+    home = [] if door is plugin_api else [f"It is in `{door.__name__}`."]
+    told = (*home, _meaning(helper), *_docstring_example(helper))
+    return [f"### {name}", f"    {name}{_signature(helper)}", *told]
 
 
 def public(name: str) -> Any:
@@ -325,25 +301,18 @@ def _signature(called: Any) -> str:
 
 def names_page() -> str:
     """Return the page of every public name, in the groups of its module."""
-    lines = [
-        HEAD + "# Public names",
-        "",
+    blocks = [
+        "# Public names",
         "Everything that a plugin may import. The roles, [signals](signals.md) and [helpers](helpers.md) have pages "
         "with examples.",
-        "",
     ]
     for door in DOORS:
-        lines += [
-            f"## graspsense.{door.__name__.rpartition('.')[2]}",
-            "",
-            _text(door).partition("\n\n")[0],
-            "",
-        ]
+        title = door.__name__.rpartition(".")[2]
+        blocks += [f"## graspsense.{title}", _text(door).partition("\n\n")[0]]
         for title, names in door.PUBLIC.groups.items():
-            lines += [f"### {title}", "", "| name | meaning |", "|---|---|"]
-            lines += [_public_row(home, name) for name, home in names]
-            lines.append("")
-    return "\n".join(lines)
+            rows = (_public_row(home, name) for name, home in names)
+            blocks += [f"### {title}", _table("| name | meaning |", rows)]
+    return _text_of_page(blocks)
 
 
 def _public_row(home: str, name: str) -> str:
@@ -402,19 +371,19 @@ def _attributes(base: Any, declared: Sequence[str]) -> list[str]:
     """Return what the class of a component declares by attributes."""
     if not declared:
         return []
-    lines = ["## What the class declares", "", "| attribute | type | meaning |", "|---|---|---|"]
+    rows = []
     for name, (kind, text) in _docstrings(base).items():
         kind = kind.removeprefix("ClassVar[").removesuffix("]" * kind.startswith("ClassVar"))
-        lines.append(f"| `{name}` | {_cell(kind)} | {_cell(_in_a_line(text))} |")
+        rows.append(f"| `{name}` | {_cell(kind)} | {_cell(_in_a_line(text))} |")
     for name in declared:
         if isinstance(value := vars(base).get(name), property):
             kind = str(inspect.signature(value.fget).return_annotation)  # type: ignore[arg-type]
-            lines.append(f"| `{name}` | {_cell(kind)} | {_cell(_in_a_line(inspect.getdoc(value) or ''))} |")
-    return [*lines, ""]
+            rows.append(f"| `{name}` | {_cell(kind)} | {_cell(_in_a_line(inspect.getdoc(value) or ''))} |")
+    return ["## What the class declares", _table("| attribute | type | meaning |", rows)]
 
 
 def _methods(base: Any) -> list[str]:
-    lines = []
+    blocks = []
     for name, method in vars(base).items():
         function = method.__func__ if isinstance(method, staticmethod) else method
         if name.startswith("_") or not callable(function):
@@ -426,8 +395,8 @@ def _methods(base: Any) -> list[str]:
         )
         must = "" if getattr(method, "__isabstractmethod__", False) else " (optional)"
         must = " (ready to use)" if name in ("result", "undefined") else must
-        lines += [f"### {name}{must}", "", f"    {name}{signature}", "", _text(function), ""]
-    return lines
+        blocks += [f"### {name}{must}", f"    {name}{signature}", _text(function)]
+    return blocks
 
 
 def _many() -> list[str]:
@@ -438,46 +407,41 @@ def _many() -> list[str]:
     ]
     return [
         "## Many grasps at once",
-        "",
         f"`graspsense.simulator_api.BatchBackend`: {_text(roles.BatchBackend)} Experiments and simulated trials use "
         "this class. A sensor backend does not have to be a batch backend.",
-        "",
         *_documented_fields(roles.BatchBackend),
         *_methods(roles.BatchBackend),
         f"`BatchOptions`: {_text(roles.BatchOptions)}",
-        "",
-        *options,
-        "",
+        "\n".join(options),
         f"`Grasped`: {_text(roles.Grasped)}",
-        "",
     ]
 
 
 def _faster(title: str, attribute: str, module: Any, classes: Sequence[str]) -> list[str]:
     """Return the section on what a class may declare so that simulated grasps take less time."""
-    lines = [f"## {title}", "", f"`{attribute}` is optional. {_text(module)}", ""]
+    blocks = [f"## {title}", f"`{attribute}` is optional. {_text(module)}"]
     for name in classes:
         cls = public(name)
-        lines += [f"### {name}", "", f"    {_fields_of(cls)}", ""]
-        lines += [*_meaning(cls), *_documented_fields(cls), *_docstring_example(cls)]
-    return lines
+        blocks += [f"### {name}", f"    {_fields_of(cls)}"]
+        blocks += [_meaning(cls), *_documented_fields(cls), *_docstring_example(cls)]
+    return blocks
 
 
-def _meaning(thing: Any) -> list[str]:
+def _meaning(thing: Any) -> str:
     """Return the docstring up to its example."""
-    return [_text(thing).partition("\n\n>>> ")[0], ""]
+    return _text(thing).partition("\n\n>>> ")[0]
 
 
 def _docstring_example(thing: Any) -> list[str]:
     """Return the example of a docstring, nothing if there is none."""
     example = (inspect.getdoc(thing) or "").partition("\n\n>>> ")[2]
-    return ["```pycon", ">>> " + example, "```", ""] if example else []
+    return [f"```pycon\n>>> {example}\n```"] if example else []
 
 
 def _documented_fields(cls: Any) -> list[str]:
     """Return a list of the fields of a class that have a docstring; nothing if none has one."""
     lines = [f"- `{name}`: {_in_a_line(text)}" for name, (kind, text) in _docstrings(cls).items() if kind]
-    return [*lines, ""] if lines else []
+    return ["\n".join(lines)] if lines else []
 
 
 def _text(thing: Any) -> str:
@@ -486,7 +450,7 @@ def _text(thing: Any) -> str:
 
 
 def _entry(cls: Any) -> list[str]:
-    lines = ["| field | type | default | meaning |", "|---|---|---|---|"]
+    rows = []
     meanings: dict[str, tuple[str, str]] = {}
     for base in reversed(cls.__mro__[:-1]):
         meanings |= _docstrings(base)
@@ -496,20 +460,19 @@ def _entry(cls: Any) -> list[str]:
         default = "required" if field.default is attrs.NOTHING else f"`{empty!r}`"
         kind = re.sub(r"(?:graspsense|collections)(?:\.[a-z_]+)*\.", "", strict._kind_words(field.type))
         kind = kind.replace("|", "or")
-        lines.append(
-            f"| `{field.name}` | {_cell(kind)} | {default} | {_cell(_in_a_line(meanings[field.name][1]))} |"
-        )
-    return [*lines, "", _text(cls), ""]
+        meaning = _cell(_in_a_line(meanings[field.name][1]))
+        rows.append(f"| `{field.name}` | {_cell(kind)} | {default} | {meaning} |")
+    return [_table("| field | type | default | meaning |", rows), _text(cls)]
 
 
 def _example(role: str) -> list[str]:
     kind, words = KINDS[role], words_of("lab-thing", [role])
     template = files("graspsense.scaffold").joinpath(f"templates/{role}/{kind.module}.py.txt")
     module = Template(template.read_text(encoding="utf-8")).substitute(words)
-    lines = []
+    blocks = []
     for name, text in (("plugin", plugin_module([role], words)), (kind.module, module)):
-        lines += [f"`src/lab_thing/{name}.py`:", "", "```python", text.rstrip(), "```", ""]
-    return lines
+        blocks += [f"`src/lab_thing/{name}.py`:", f"```python\n{text.rstrip()}\n```"]
+    return blocks
 
 
 def _cell(text: str) -> str:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import attrs
 import click
 
-from graspsense.cli.options import option_group, pipeline_options, settings_of
+from graspsense.cli.options import Finite, option_group, pipeline_options, settings_of
 from graspsense.cli.output import echo_values, json_option
 from graspsense.cli.terminal import Subcommands, echo, echo_table, talk
 from graspsense.core.components.channels import fingertips
@@ -141,7 +141,7 @@ def delivered_force(readings: str, replace: bool, **asked: Any) -> None:
 @click.option(
     "--gaps", type=click.IntRange(2, 90), default=5, show_default=True, help="Number of gaps to measure at."
 )
-@click.option("--narrowest", "narrowest_m", type=click.FloatRange(0.002, 0.08), default=0.01, show_default=True,
+@click.option("--narrowest", "narrowest_m", type=Finite(0.002, 0.08), default=0.01, show_default=True,
               help="Smallest gap, in m.")  # fmt: skip
 @_options
 def friction(gaps: int, narrowest_m: float, replace: bool, **asked: Any) -> None:

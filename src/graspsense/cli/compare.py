@@ -132,12 +132,17 @@ def _print(ranking: Ranking) -> None:
 
 def _names(text: str, option: str, role: Role) -> tuple[str, ...]:
     """Return the names of components of a role that an option lists. Raises UsageError for an unknown one."""
-    names = tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
-    if not names:
-        raise click.UsageError(f"{option} names nothing: give names with commas between them")
-    for name in names:
+    names: dict[str, str] = {}
+    for name in filter(None, map(str.strip, text.split(","))):
         try:
-            installed().find(role, name)
+            component = installed().find(role, name).qualified
         except UnknownName as unknown:
             raise click.UsageError(f"{option} {name}: {unknown}") from None
-    return names
+        if component in names:
+            raise click.UsageError(
+                f"{option}: {names[component]} and {name} are the same, {component}: name each once"
+            )
+        names[component] = name
+    if not names:
+        raise click.UsageError(f"{option} names nothing: give names with commas between them")
+    return tuple(names.values())

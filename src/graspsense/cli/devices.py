@@ -5,7 +5,7 @@ from __future__ import annotations
 import attrs
 import click
 
-from graspsense.cli.options import Seconds
+from graspsense.cli.options import time_range
 from graspsense.cli.output import echo_values, json_option
 from graspsense.cli.terminal import echo, echo_table, state_style, talk
 from graspsense.core.components.registry import installed
@@ -15,7 +15,7 @@ from graspsense.core.components.registry import installed
 @click.option(
     "--timeout",
     "timeout_s",
-    type=Seconds(),
+    type=time_range(),
     default=2.0,
     show_default=True,
     help="Time limit for each plugin, in seconds.",

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from graspsense.cli.events import evaluate_events
-from graspsense.cli.options import Seconds, refuse_typed, target_option
+from graspsense.cli.options import refuse_typed, target_option, time_range
 from graspsense.cli.output import check_outputs, echo_values, file_to_write, json_option, page_to_write
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import (
@@ -64,7 +64,7 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--tolerance",
-    type=Seconds(60.0),
+    type=time_range(60.0),
     default=0.25,
     show_default=True,
     metavar="SECONDS",
@@ -194,19 +194,10 @@ def _print(evaluation: Evaluation) -> None:
     _print_doubt(evaluation)
     echo_entries("note", evaluation.notes)
     echo()
-    controls = {
-        name: control for name, control in evaluation.controls.items() if name not in evaluation.protocols
-    }
-    measured = {
-        name: measurement
-        for name, measurement in {**evaluation.protocols, **controls}.items()
-        if measurement.rate is not None
-    }
-    echo_table(
-        ("PROTOCOL OR CONTROL", "RATE", "95 %", "TRIALS", "LOWER BY, IN POINTS", "WHAT"),
-        [_row(name, measurement, evaluation.headline.n) for name, measurement in measured.items()],
-    )
-    for name, measurement in {**evaluation.protocols, **controls}.items():
+    # What is both counts as a protocol; these come first.
+    measurements = {**evaluation.protocols, **evaluation.controls, **evaluation.protocols}
+    _print_measurements(measurements, evaluation.headline.n)
+    for name, measurement in measurements.items():
         if measurement.rate is None:
             echo(f"{name}: not measured ({measurement.reason})", indent=2)
     echo("\nconfusion (rows are the truth)")
@@ -255,14 +246,13 @@ def _print_doubt(evaluation: Evaluation) -> None:
         )
 
 
-def _row(name: str, measured: Measurement, trials: int) -> tuple[str, ...]:
-    assert measured.rate is not None
-    rate = measured.rate
-    return (
-        name,
-        percent(rate.rate),
-        percentages(rate.interval),
-        f"{rate.n} of {trials}",
-        "" if measured.difference is None else measured.difference.points,
-        f"{measured.what}{f' (compared with {measured.difference_of})' if measured.difference_of else ''}",
-    )
+def _print_measurements(measurements: Mapping[str, Measurement], trials: int) -> None:
+    rows = []
+    for name, measured in measurements.items():
+        if (rate := measured.rate) is None:
+            continue
+        lower_by = "" if measured.difference is None else measured.difference.points
+        compared = f" (compared with {measured.difference_of})" if measured.difference_of else ""
+        cells = (name, percent(rate.rate), percentages(rate.interval), f"{rate.n} of {trials}")
+        rows.append((*cells, lower_by, measured.what + compared))
+    echo_table(("PROTOCOL OR CONTROL", "RATE", "95 %", "TRIALS", "LOWER BY, IN POINTS", "WHAT"), rows)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shlex
 import sys
+from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,14 +16,14 @@ from graspsense.cli.live import Live, LiveOptions, live_options, shown_live
 from graspsense.cli.options import force_option, keys_option
 from graspsense.cli.output import echo_found, echo_values, file_to_write, json_option
 from graspsense.cli.progress import ProgressLine
-from graspsense.cli.terminal import Style, echo, echo_entry, echo_table, talk
+from graspsense.cli.terminal import Style, echo, echo_entries, echo_entry, echo_rows, echo_table, talk
 from graspsense.core.files.whole_file import SaveFailed
 from graspsense.core.values.errors import ExitCode, counted
 from graspsense.evaluation.intervals import percent, percentages
 from graspsense.report.write import write_html
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Mapping
 
     from graspsense.experiments.duration import Effort
     from graspsense.experiments.executors.executor import Executor
@@ -30,7 +31,8 @@ if TYPE_CHECKING:
     from graspsense.experiments.findings import Findings
     from graspsense.experiments.results import Results
     from graspsense.experiments.run import Account
-    from graspsense.experiments.summary import Summary
+    from graspsense.experiments.summary import ConditionResult, Summary
+    from graspsense.report.found_table import FoundTable
 
 _MOST_NAMED = 8
 
@@ -110,9 +112,8 @@ def experiment(
             problem = str(error)
         more = findings_of(summary)
         shown.told("progress", {"text": answer(summary) if more is None else more.answer})
-    findings: dict[str, Any] = {} if more is None else {"answer": more.answer, "findings": dict(more.values)}
-    findings["page"] = page
-    echo_values({**summary.as_json(), **findings, **_counts(account, problem)})
+    findings = {} if more is None else {"answer": more.answer, "findings": dict(more.values)}
+    echo_values({**summary.as_json(), **findings, "page": page, **_counts(account, problem)})
     _print(summary, more, account, page or f"none: {problem}")
     if account.stopped == "interrupted":
         raise click.exceptions.Exit(ExitCode.INTERRUPTED)
@@ -222,18 +223,12 @@ def _print(summary: Summary, more: Findings | None, account: Account, page: str)
         _print_rates(summary)
     else:
         for table in more.tables:
-            echo(table.title, Style.HEADING)
-            echo_found(table)
-            echo()
-    for line in summary.doubts:
-        echo_entry("WARNING", line, Style.CAUTION)
+            _print_table(table)
+    echo_entries("WARNING", summary.doubts, Style.CAUTION)
     for note in account.notes:
         echo(f"note: {note}", Style.CAUTION, indent=2)
     echo(account.words, Style.GOOD if account.complete else Style.CAUTION)
-    reasons: dict[str, int] = {}
-    for failure in account.failed:
-        reasons[failure.reason] = reasons.get(failure.reason, 0) + 1
-    for reason, times in reasons.items():
+    for reason, times in Counter(failure.reason for failure in account.failed).items():
         echo(f"  failed {counted(times, 'time')}: {reason}", Style.BAD, indent=2)
     if account.stopped:
         echo(f"  stopped: {account.stopped}", Style.BAD, indent=2)
@@ -242,25 +237,25 @@ def _print(summary: Summary, more: Findings | None, account: Account, page: str)
     echo_entry("page", page)
 
 
+def _print_table(table: FoundTable) -> None:
+    """Print a table below its title; without rows its note."""
+    echo(table.title, Style.HEADING)
+    echo_found(table) if table.rows else echo(table.note)
+    echo()
+
+
 def _print_rates(summary: Summary) -> None:
-    rows = [
-        (
-            condition.name or "-",
-            condition.target,
-            percent(condition.rate.mean),
-            percentages(condition.rate.interval),
-            condition.protocol,
-        )
-        for condition in summary.conditions
-    ]
-    if rows:
-        echo_table(("CASE", "TARGET", "RATE", "95 %", "PROTOCOL"), rows)
+    columns: Mapping[str, Callable[[ConditionResult], str]] = {
+        "CASE": lambda condition: condition.name or "-",
+        "TARGET": lambda condition: condition.target,
+        "RATE": lambda condition: percent(condition.rate.mean),
+        "95 %": lambda condition: percentages(condition.rate.interval),
+        "PROTOCOL": lambda condition: condition.protocol,
+    }
+    if summary.conditions:
+        echo_rows(summary.conditions, columns)
         echo()
-    _print_doubts(summary)
-
-
-def _print_doubts(summary: Summary) -> None:
-    """Print what the controls and the trials of the first seed say against the rates, each once."""
+    # What the controls and the trials of the first seed say against the rates, each once.
     several = len(summary.conditions) > 1
     warnings = [
         f"{condition.name}: {warning}" if several else warning
@@ -270,8 +265,7 @@ def _print_doubts(summary: Summary) -> None:
     notes = [note for condition in summary.conditions for note in condition.of_first_seed.notes]
     for key, texts, style in (("WARNING", warnings, Style.CAUTION), ("note", notes, None)):
         different = list(dict.fromkeys(texts))
-        for text in different[:_MOST_NAMED]:
-            echo_entry(key, text, style)
+        echo_entries(key, different[:_MOST_NAMED], style)
         if len(different) > _MOST_NAMED:
             echo_entry(key, f"and {len(different) - _MOST_NAMED} more, which --json tells", style)
 
@@ -304,13 +298,7 @@ def compare(folders: tuple[str, ...], out: str) -> None:
     echo_values({**comparison.as_json(), "page": out})
     echo(comparison.answer, Style.RESULT)
     echo()
-    for line in doubts(comparison):
-        echo(f"WARNING     {line}", Style.CAUTION, indent=12)
+    echo_entries("WARNING", doubts(comparison), Style.CAUTION)
     for table in comparison_tables(comparison):
-        echo(table.title, Style.HEADING)
-        if table.rows:
-            echo_found(table)
-        else:
-            echo(table.note)
-        echo()
-    echo(f"page        {out}", indent=12)
+        _print_table(table)
+    echo_entry("page", out)

@@ -56,7 +56,8 @@ def export(source: str, target: str, pictures: bool) -> None:
     writers = export_table.WRITERS if table else export_trace.WRITERS
     if path.suffix not in writers:
         what = "the table of a store" if table else "one grasp"
-        raise ConfigError(f"{target!r}: {what} can be written as {', '.join(writers)}")
+        sets = "".join(f", or as {name}:FOLDER" for name in datasets_to_write() if table)
+        raise ConfigError(f"{target!r}: {what} can be written as {', '.join(writers)}{sets}")
     if pictures and (table or path.suffix != ".mcap"):
         raise ConfigError(
             f"{target!r}: --pictures is for one grasp as .mcap: graspsense export DIR#12 --to g.mcap --pictures"

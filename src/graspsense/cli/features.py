@@ -54,14 +54,13 @@ def features(source: str, options: tuple[str, ...], keep: str | None, overwrite:
             "file": keep,
         }
     )
-    echo_table(
-        ("FEATURE", "UNIT", "TRIALS BEFORE", "NOW", "MEDIAN BEFORE", "NOW"),
-        [
-            (row["name"], row["unit"], _count(row["trials_before"], stored), _count(row["trials"], after),
-             _number(row["median_before"]), _number(row["median"]))
-            for row in rows
-        ],
-    )  # fmt: skip
+    cells = []
+    for row in rows:
+        trials = (f"{row['trials_before']} of {len(stored)}", f"{row['trials']} of {len(after)}")
+        medians = (row["median_before"], row["median"])
+        shown = ("" if median is None else f"{median:.4g}" for median in medians)
+        cells.append((row["name"], row["unit"], *trials, *shown))
+    echo_table(("FEATURE", "UNIT", "TRIALS BEFORE", "NOW", "MEDIAN BEFORE", "NOW"), cells)
     echo()
     echo_entries("note", after.notes)
     if keep:
@@ -79,12 +78,10 @@ def _rows(stored: Labelled, after: Labelled) -> list[dict[str, Any]]:
         return values[~np.isnan(values)]
 
     rows = []
-    names = dict.fromkeys((*after.table.names, *stored.table.names))
-    units = {
-        **dict(zip(stored.table.names, stored.table.units, strict=True)),
-        **dict(zip(after.table.names, after.table.units, strict=True)),
-    }
-    for name in names:
+    units: dict[str, str] = {}
+    for table in (after.table, stored.table):
+        units = {**dict(zip(table.names, table.units, strict=True)), **units}
+    for name in dict.fromkeys((*after.table.names, *stored.table.names)):
         was, now = known(stored, name), known(after, name)
         rows.append(
             {
@@ -97,11 +94,3 @@ def _rows(stored: Labelled, after: Labelled) -> list[dict[str, Any]]:
             }
         )
     return rows
-
-
-def _count(n: int, labelled: Labelled) -> str:
-    return f"{n} of {len(labelled)}"
-
-
-def _number(value: float | None) -> str:
-    return "" if value is None else f"{value:.4g}"

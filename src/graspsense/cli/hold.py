@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import click
 
-from graspsense.cli.options import Seconds, pipeline_options, sets_key, settings_of
+from graspsense.cli.options import pipeline_options, sets_key, settings_of, time_range
 from graspsense.cli.run import finish, grasped, print_trial
 from graspsense.cli.terminal import talk
 from graspsense.core.pipeline.wiring import check
@@ -24,7 +24,7 @@ TO_GRASP_S: Final = 60.0
 @click.command()
 @click.option(
     "--seconds",
-    type=Seconds(LONGEST_S),
+    type=time_range(LONGEST_S),
     default=60.0,
     show_default=True,
     help="Time from the grip until the fingers open.",

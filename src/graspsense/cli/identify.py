@@ -91,7 +91,7 @@ def identify(
     if page:
         from graspsense.report.identification import identification_page
 
-        write_html(Path(page), identification_page(result, Path(out).name))
+        write_html(Path(page), identification_page(result, "" if refused else Path(out).name))
     for note in result.notes:
         talk(f"note: {note}")
     echo_values(_as_values(None if refused else out, result))
@@ -139,13 +139,12 @@ def _print(result: Identification) -> None:
 
 
 def _as_values(out: str | None, result: Identification) -> dict[str, Any]:
+    tables = ("parameters", "candidates", "undetermined")
     return {
         "scene": out,
         "label": result.label,
         "seconds": result.seconds,
-        "parameters": list(map(asdict, result.parameters)),
-        "candidates": list(map(asdict, result.candidates)),
-        "undetermined": list(map(asdict, result.undetermined)),
+        **{name: list(map(asdict, getattr(result, name))) for name in tables},
         "fits": [{"name": fit.name, "rms_n": fit.rms_n, "peak_n": fit.peak_n} for fit in result.fits],
         "held_out": list(result.held_out),
         "refusals": list(result.refusals),

@@ -25,7 +25,7 @@ from graspsense.cli.terminal import (
     echo_as_it_is,
     echo_entries,
     echo_entry,
-    echo_table,
+    echo_rows,
     values_alone,
 )
 from graspsense.core.components.registry import installed
@@ -407,23 +407,19 @@ def _echo_summary(summary: ImportSummary) -> None:
     gap, factor = display_unit(summary.units.get("gap", "m"))
     force = summary.units.get("force_left", "N")
     time = "Hz" if summary.units.get("t", "s") == "s" else f"per {summary.units['t']}"
-    header = (
-        "LABEL", "GRASPS", "OBJECTS", "SAMPLES", f"RATE, {time}", f"GAP, {gap}", f"LEFT, {force}", f"RIGHT, {force}",
-    )  # fmt: skip
-    rows = [
-        (
-            label.label or "none",
-            str(label.grasps),
-            "unknown" if label.instances is None else str(label.instances),
-            _span(label.samples),
-            _span(label.rate_hz),
-            _span(tuple(factor * value for value in label.gap)),
-            _span(label.left),
-            _span(label.right),
-        )
-        for label in summary.labels
-    ]
-    echo_table(header, rows)
+    echo_rows(
+        summary.labels,
+        {
+            "LABEL": lambda label: label.label or "none",
+            "GRASPS": lambda label: str(label.grasps),
+            "OBJECTS": lambda label: "unknown" if label.instances is None else str(label.instances),
+            "SAMPLES": lambda label: _span(label.samples),
+            f"RATE, {time}": lambda label: _span(label.rate_hz),
+            f"GAP, {gap}": lambda label: _span(tuple(factor * value for value in label.gap)),
+            f"LEFT, {force}": lambda label: _span(label.left),
+            f"RIGHT, {force}": lambda label: _span(label.right),
+        },
+    )
     echo()
     echo_entry("grasps", str(summary.grasps))
     echo_entries("", summary.notes)

@@ -11,7 +11,7 @@ import click
 from attrs import asdict
 
 from graspsense.cli.output import echo_values
-from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entries, echo_entry, echo_table, talk
+from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entries, echo_entry, echo_rows, talk
 from graspsense.core.files.whole_file import write_new
 from graspsense.core.values.errors import GraspsenseError, PluginUnavailable
 from graspsense.core.values.units import display_unit
@@ -67,37 +67,32 @@ def suggest_manifest(sources: Sequence[str], name: str) -> None:
 
 def echo_channels(channels: Sequence[ChannelFacts]) -> None:
     """Print a table of channels."""
-    header = (
-        "CHANNEL",
-        "UNIT",
-        "SAMPLES",
-        "MISSING",
-        "RANGE",
-        "RESOLUTION",
-        "RATE, Hz",
-        "LONGEST GAP, s",
-        "AGE, s",
-    )
-    rows = []
-    for channel in channels:
-        unit, factor = display_unit(channel.unit)
-        rows.append(
-            (
-                channel.name,
-                unit or "unknown",
-                str(channel.samples),
-                str(channel.missing),
-                "none"
-                if channel.low is None or channel.high is None
-                else f"{factor * channel.low:.4g} to {factor * channel.high:.4g}",
-                "none" if channel.resolution is None else f"{factor * channel.resolution:.3g}",
-                _shown(channel.rate_hz),
-                _shown(channel.longest_gap_s),
-                _shown(channel.age_s),
-            )
-        )
     echo()
-    echo_table(header, rows)
+    echo_rows(
+        channels,
+        {
+            "CHANNEL": lambda channel: channel.name,
+            "UNIT": lambda channel: display_unit(channel.unit)[0] or "unknown",
+            "SAMPLES": lambda channel: str(channel.samples),
+            "MISSING": lambda channel: str(channel.missing),
+            "RANGE": _range,
+            "RESOLUTION": lambda channel: (
+                "none"
+                if channel.resolution is None
+                else f"{display_unit(channel.unit)[1] * channel.resolution:.3g}"
+            ),
+            "RATE, Hz": lambda channel: _shown(channel.rate_hz),
+            "LONGEST GAP, s": lambda channel: _shown(channel.longest_gap_s),
+            "AGE, s": lambda channel: _shown(channel.age_s),
+        },
+    )
+
+
+def _range(channel: ChannelFacts) -> str:
+    if channel.low is None or channel.high is None:
+        return "none"
+    factor = display_unit(channel.unit)[1]
+    return f"{factor * channel.low:.4g} to {factor * channel.high:.4g}"
 
 
 def _shown(value: float | None) -> str:

@@ -3,16 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Final
 
-from graspsense.cli.terminal import echo, echo_entry, echo_table
+from graspsense.cli.terminal import echo, echo_entry, echo_rows, echo_table
 
 MOST_CHANGES: Final = 4
 """Features whose changes are listed for a term; of the others there is only the number."""
 
 
-def print_model(model: Mapping[str, Any]) -> None:
+def print_report(report: Mapping[str, Any]) -> None:
+    """Print what a simulated gripper reports of its model: what is not verified, and where asked for, its terms."""
+    _print_not_verified(report)
+    if "model" in report:
+        _print_model(report["model"])
+        if "selection" in report:
+            print_without(report["model"].get("without", ()), report["selection"]["accuracy"])
+            _print_selection(report["selection"])
+
+
+def _print_model(model: Mapping[str, Any]) -> None:
     """Print what a simulated gripper reports as `model`: one row a term."""
     echo()
     if not model["touched"]:
@@ -23,20 +33,16 @@ def print_model(model: Mapping[str, Any]) -> None:
         f"peak force {model['peak_n']:.2f} N, compression {model['compression_m'] * 1e3:.3f} mm, "
         f"of the pads {model['pads_m'] * 1e3:.3f} mm",
     )
-    rows = [
-        (
-            row["term"],
-            f"{row['peak_n']:.3f} N",
-            f"{row['at_peak_n']:.3f} N",
-            f"{100 * row['share']:.1f} %",
-            f"{row['work_j'] * 1e3:.2f} mJ",
-            f"{row['lost_j'] * 1e3:.2f} mJ",
-            _times(row["rates"]),
-        )
-        for row in model["terms"]
-    ]
-    header = ("TERM", "PEAK", "AT PEAK", "SHARE", "WORK", "LOST", "TIME CONSTANTS")
-    echo_table(header, rows)
+    columns: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
+        "TERM": lambda row: row["term"],
+        "PEAK": lambda row: f"{row['peak_n']:.3f} N",
+        "AT PEAK": lambda row: f"{row['at_peak_n']:.3f} N",
+        "SHARE": lambda row: f"{100 * row['share']:.1f} %",
+        "WORK": lambda row: f"{row['work_j'] * 1e3:.2f} mJ",
+        "LOST": lambda row: f"{row['lost_j'] * 1e3:.2f} mJ",
+        "TIME CONSTANTS": lambda row: _times(row["rates"]),
+    }
+    echo_rows(model["terms"], columns)
 
 
 def print_without(rows: Iterable[Mapping[str, Any]], accuracy: float) -> None:
@@ -73,7 +79,7 @@ def _change(name: str, effect: Mapping[str, Any]) -> str:
     return f"{name} is no longer defined" if effect["without"] is None else f"{name} becomes defined"
 
 
-def print_not_verified(report: Mapping[str, Any]) -> None:
+def _print_not_verified(report: Mapping[str, Any]) -> None:
     """Print for which quantities a simulated gripper does not guarantee its accuracy, if any, and an unstable loop."""
     if report.get("unstable_loop"):
         echo_entry("simulation", report["unstable_loop"])
@@ -86,7 +92,7 @@ def print_not_verified(report: Mapping[str, Any]) -> None:
         echo_entry("simulation", f"its accuracy is not verified for: {', '.join(names)} ({why})")
 
 
-def print_selection(selection: Mapping[str, Any]) -> None:
+def _print_selection(selection: Mapping[str, Any]) -> None:
     """Print what a simulated gripper reports as `selection`: the steps of the grasp, and what verified them."""
     echo()
     level, verified = selection["level"], selection["verified"]

@@ -19,18 +19,20 @@ GRIPPER_ALONE: Final = ("classifier.type=none",)
 """Before the options of a command that is about the gripper: a classifier that is missing must not stop it."""
 
 
-class Seconds(click.FloatRange):
-    """A time above 0 s, at most `longest_s`; NaN is none, which a range of click takes."""
-
-    def __init__(self, longest_s: float | None = None) -> None:
-        super().__init__(0.0, longest_s, min_open=True)
+class Finite(click.FloatRange):
+    """A number in a range; NaN is none, which a range of click takes."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """Return the time, or refuse it."""
-        seconds = float(super().convert(value, param, ctx))
-        if seconds != seconds:
-            self.fail("nan is no time: give a number of seconds", param, ctx)
-        return seconds
+        """Return the number, or refuse it."""
+        number = float(super().convert(value, param, ctx))
+        if number != number:
+            self.fail(f"{number} is not a number", param, ctx)
+        return number
+
+
+def time_range(longest_s: float | None = None) -> Finite:
+    """Return the type of an option that takes a time above 0 s, at most `longest_s`."""
+    return Finite(0.0, longest_s, min_open=True)
 
 
 def option_group(*options: Callable[[Any], Any]) -> Callable[[CommandT], CommandT]:

@@ -169,21 +169,21 @@ def check(
     metavar="ROLE",
     help="Role of a component; give it several times for several. An unknown role lists all of them.",
 )
-@click.option("--folder", type=click.Path(path_type=Path), help="Folder of the package.  [default: ./NAME]")
+@click.option("--folder", metavar="DIR", help="Folder of the package.  [default: ./NAME]")
 @click.option(
     "--mujoco",
     "model",
     metavar="MODEL.xml",
     help="Write only a gripper file, NAME.toml, for a MuJoCo model (--role sensor-backend).",
 )
-def new(name: str, roles: tuple[str, ...], folder: Path | None, model: str | None) -> None:
+def new(name: str, roles: tuple[str, ...], folder: str | None, model: str | None) -> None:
     """Create the package of a new plugin, with tests, for one role or for several that fit together."""
     from graspsense.scaffold.make import make
 
     if model is not None:
-        _write_gripper_file(name, roles, folder or Path(), model)
+        _write_gripper_file(name, roles, Path(folder or "."), model)
         return
-    for line in make(name, roles, folder if folder is not None else Path(name)):
+    for line in make(name, roles, Path(folder or name)):
         echo(line, indent=2)
 
 

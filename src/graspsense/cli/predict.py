@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from graspsense.cli.options import refuse_typed
 from graspsense.cli.output import echo_values, json_option
 from graspsense.cli.sources import SOURCES, source_argument, source_options, to_predict
 from graspsense.cli.target_value import predict_value
@@ -55,6 +56,7 @@ def predict(model: str, source: str, **given: Any) -> None:
     from graspsense.regression.model import is_regression
 
     _refuse_swapped(model, source)
+    refuse_typed(["features"], "is not for predict: the model says which features it reads")
     if is_regression(model):
         return predict_value(model, source, given)
     asked = load_model(model, installed())

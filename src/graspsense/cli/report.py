@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from graspsense.cli.options import SEED, target_option
-from graspsense.cli.output import echo_values, json_option
+from graspsense.cli.output import echo_values, json_option, page_to_write
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import folds_option, named_store
 from graspsense.cli.terminal import Style, echo, echo_as_it_is, warn
@@ -53,7 +53,7 @@ def report(
     from graspsense.report.number_section import number_sections, with_numbers
     from graspsense.report.store_page import store_page
 
-    path = Path(out or folder) / NAME
+    path = Path(folder) / NAME if out is None or Path(out) == Path(folder) else page_to_write(out)
     if (Path(folder) / EXPERIMENT).is_file():
         from graspsense.experiments.summary import summary_of
 

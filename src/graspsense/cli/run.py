@@ -11,7 +11,7 @@ import click
 
 from graspsense.cli.live import LiveOptions, live_options, shown_live, viewer_options
 from graspsense.cli.live_rows import LiveRows
-from graspsense.cli.model_table import print_model, print_not_verified, print_selection, print_without
+from graspsense.cli.model_table import print_report
 from graspsense.cli.options import contradiction, names_object, pipeline_options, plot_option, settings_of
 from graspsense.cli.output import echo_values, json_option
 from graspsense.cli.terminal import (
@@ -20,7 +20,7 @@ from graspsense.cli.terminal import (
     echo,
     echo_entries,
     echo_entry,
-    echo_table,
+    echo_rows,
     prediction_style,
     state_style,
     talk,
@@ -147,7 +147,7 @@ def run(
         echo_values(_as_json(trial, kept))
         print_trial(trial)
         _print_better(settings, trial)
-        _print_model(trial)
+        print_report(trial.report)
         if plot is not None:
             draw_grasp(trial, Path(plot))
         _write_film(film, save, kept)
@@ -228,16 +228,6 @@ def _print_better(settings: Settings, trial: Trial) -> None:
             "better",
             f"this pipeline is {entry.name}; {entry.better} recognises more: --pipeline {entry.better}",
         )
-
-
-def _print_model(trial: Trial) -> None:
-    """Print what is known of the simulator's model: what is not verified, and where asked for, its terms."""
-    print_not_verified(trial.report)
-    if "model" in trial.report:
-        print_model(trial.report["model"])
-        if "selection" in trial.report:
-            print_without(trial.report["model"].get("without", ()), trial.report["selection"]["accuracy"])
-            print_selection(trial.report["selection"])
 
 
 def _settings_to_run(
@@ -421,18 +411,17 @@ def _say_what_would_be_done(settings: Settings) -> None:
         echo(f"commands: not rehearsed, {why_not}")
     else:
         echo(f"would command, as rehearsed on {rehearsed.device} ({rehearsed.outcome}):")
-        rows = [
-            (
-                phase.phase,
-                ", ".join(phase.kinds) or "none",
-                f"{phase.seconds:.2f} s",
-                effort_words(phase.kinds, phase.least_n, phase.most_n),
-                f"{phase.fastest_m_s * 1e3:.0f} mm/s",
-                f"{phase.limited} limited" if phase.limited else "",
-            )
-            for phase in rehearsed.phases
-        ]
-        echo_table(("PHASE", "COMMAND", "FOR", "EFFORT (+ squeezes)", "FASTEST", "BY THE GUARD"), rows)
+        echo_rows(
+            rehearsed.phases,
+            {
+                "PHASE": lambda phase: phase.phase,
+                "COMMAND": lambda phase: ", ".join(phase.kinds) or "none",
+                "FOR": lambda phase: f"{phase.seconds:.2f} s",
+                "EFFORT (+ squeezes)": lambda phase: effort_words(phase.kinds, phase.least_n, phase.most_n),
+                "FASTEST": lambda phase: f"{phase.fastest_m_s * 1e3:.0f} mm/s",
+                "BY THE GUARD": lambda phase: f"{phase.limited} limited" if phase.limited else "",
+            },
+        )
         if not any(phase.seconds for phase in rehearsed.phases):
             echo("the emulated gripper was commanded nothing: this rehearsal shows nothing of the real one")
     echo("nothing was opened")

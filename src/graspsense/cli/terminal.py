@@ -19,7 +19,7 @@ from contextlib import contextmanager, nullcontext, redirect_stdout
 from enum import Enum
 from functools import partial
 from io import StringIO
-from typing import IO, Final
+from typing import IO, Final, TypeVar
 from unicodedata import combining, east_asian_width
 
 import click
@@ -54,6 +54,7 @@ _NUMBER: Final = re.compile(r"[+−-]?[0-9]+([.][0-9]+)?( ?[%\w/]{1,4})?")
 _GOOD: Final = frozenset({"loaded", "ready", "pass", "ok", "steady", "yes"})
 _BAD: Final = frozenset({"broken", "fail", "failed", "problem", "PROBLEM", "aborted", "device lost", "no"})
 
+ItemT = TypeVar("ItemT")
 StyleOf = Callable[[str], Style | None]
 """Returns the style of a cell with this text."""
 
@@ -233,6 +234,15 @@ def echo_table(
             for name, cell, style in list(zip(header, row, of_column, strict=True))[1:]:
                 if cell:
                     echo_entry(f"  {name}", cell, style(cell), width=wide)
+
+
+def echo_rows(
+    items: Iterable[ItemT],
+    columns: Mapping[str, Callable[[ItemT], str]],
+    styles: Mapping[str, StyleOf] | None = None,
+) -> None:
+    """Print a table with one row for each item; `columns` tells the text below each header."""
+    echo_table(tuple(columns), [[text(item) for text in columns.values()] for item in items], styles)
 
 
 def _lines(text: str) -> list[str]:

@@ -11,11 +11,11 @@ from attrs import asdict
 
 from graspsense.cli.output import echo_values, json_option
 from graspsense.cli.sources import named_store
-from graspsense.cli.terminal import Subcommands, echo, echo_table
+from graspsense.cli.terminal import Subcommands, echo, echo_rows, echo_table
 from graspsense.core.learn.target_value import value_label
 from graspsense.core.settings.resolved import settings_from
 from graspsense.core.values.errors import ConfigError, GraspsenseError
-from graspsense.store.changes import history
+from graspsense.store import changes
 from graspsense.store.labels import agrees, labels_of
 
 if TYPE_CHECKING:
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 HEADER: Final = ("TRIAL", "MADE", "LABEL", "INSTANCE", "OUTCOME", "GRIPPER", "STATE")
 
 _REFS = click.argument("refs", nargs=-1, required=True, metavar="DIR#NUMBER...")
+_WHY = click.option("--why", metavar="TEXT", default="", help="Reason, kept in the history.")
 _JSON = json_option()
 
 
@@ -48,8 +49,8 @@ def list_trials(folder: str, label: str | None, aside: bool | None, limit: int) 
 
     with Store.read(folder) as store:
         page = store.page(label=label, set_aside=aside, limit=limit)
-        changes = history(store)
-    last_relabel = {change.trial: change for change in changes if change.action == "relabel"}
+        every = changes.history(store)
+    last_relabel = {change.trial: change for change in every if change.action == "relabel"}
     echo_values([{**asdict(trial), "relabelled": trial.id in last_relabel} for trial in page])
     rows = []
     for trial in page:
@@ -69,15 +70,13 @@ def list_trials(folder: str, label: str | None, aside: bool | None, limit: int) 
 @_REFS
 @click.option("--label", metavar="CLASS:STATE", help="The new label: can:full_open, or can:full_open#2.")
 @click.option("--as-recorded", is_flag=True, help="Restore the label with which the trial was recorded.")
-@click.option("--why", metavar="TEXT", default="", help="Reason, kept in the history.")
+@_WHY
 @_JSON
 def relabel(refs: Sequence[str], label: str | None, as_recorded: bool, why: str) -> None:
     """Change the label of trials; `history` shows the one before.
 
     A trial of a simulated gripper keeps the label of the object that was simulated.
     """
-    from graspsense.store import changes
-
     if (label is None) != as_recorded:
         raise click.UsageError("give either --label CLASS:STATE or --as-recorded")
     labels = None if label is None else labels_of(label)
@@ -97,15 +96,13 @@ def relabel(refs: Sequence[str], label: str | None, as_recorded: bool, why: str)
 @click.option(
     "--as-recorded", metavar="NAME", help="Restore the number that the trial was recorded with, or none."
 )
-@click.option("--why", metavar="TEXT", default="", help="Reason, kept in the history.")
+@_WHY
 @_JSON
 def change_value(refs: Sequence[str], value: str | None, as_recorded: str | None, why: str) -> None:
     """Change a number to predict of trials, or give them one; `history` shows the one before.
 
     `train`, `evaluate` and `report` use these numbers with --target-value.
     """
-    from graspsense.store import changes
-
     if (value is None) == (as_recorded is None):
         raise click.UsageError('give either --value "NAME [UNIT]=NUMBER" or --as-recorded NAME')
     heading, cell = (as_recorded or "", None) if value is None else value_label(value)
@@ -118,19 +115,15 @@ def change_value(refs: Sequence[str], value: str | None, as_recorded: str | None
 @_JSON
 def aside(refs: Sequence[str], why: str) -> None:
     """Set trials aside: they stay in the store, but are not counted, exported as a table, or learned from."""
-    from graspsense.store import changes
-
     _change(refs, lambda store, numbers: changes.set_aside(store, numbers, why))
 
 
 @trials.command()
 @_REFS
-@click.option("--why", metavar="TEXT", default="", help="Reason, kept in the history.")
+@_WHY
 @_JSON
 def restore(refs: Sequence[str], why: str) -> None:
     """Bring trials back that were set aside."""
-    from graspsense.store import changes
-
     _change(refs, lambda store, numbers: changes.set_aside(store, numbers, why, aside=False))
 
 
@@ -144,15 +137,19 @@ def show_history(source: str) -> None:
 
     folder, number = (source, None) if Path(source).is_dir() else parse_trial_ref(source)
     with Store.read(folder) as store:
-        changes = history(store, number)
-    echo_values([change.as_json() for change in changes])
-    if not changes:
+        history = changes.history(store, number)
+    echo_values([change.as_json() for change in history])
+    if not history:
         echo("nothing was changed after recording")
-    rows = [
-        (str(change.trial), change.made_at[:19].replace("T", " ") or "unknown", change.words, change.why)
-        for change in changes
-    ]
-    echo_table(("TRIAL", "WHEN", "CHANGE", "WHY"), rows)
+    echo_rows(
+        history,
+        {
+            "TRIAL": lambda change: str(change.trial),
+            "WHEN": lambda change: change.made_at[:19].replace("T", " ") or "unknown",
+            "CHANGE": lambda change: change.words,
+            "WHY": lambda change: change.why,
+        },
+    )
 
 
 def _change(refs: Sequence[str], change: Callable[[Store, Sequence[int]], None]) -> None:
@@ -169,14 +166,12 @@ def _change(refs: Sequence[str], change: Callable[[Store, Sequence[int]], None])
     (folder,) = folders
     Store.read(folder).close()  # a store that does not exist is not created
     with Store.open(folder) as store:
-        earlier = len(history(store))
+        earlier = len(changes.history(store))
         change(store, [number for _, number in trials])
-        done = history(store)[earlier:]
-    echo_values({"store": folder, "changes": [change_.as_json() for change_ in done]})
-    for change_ in done:
-        echo(
-            f"trial {change_.trial}: {change_.words}" + (f" ({change_.why})" if change_.why else ""), indent=2
-        )
+        done = changes.history(store)[earlier:]
+    echo_values({"store": folder, "changes": [made.as_json() for made in done]})
+    for made in done:
+        echo(f"trial {made.trial}: {made.words}" + (f" ({made.why})" if made.why else ""), indent=2)
 
 
 def _refuse_contradiction(trial: StoredTrial, label: str) -> None:

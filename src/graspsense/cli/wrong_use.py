@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from difflib import get_close_matches
+from errno import ENOSPC
 from pathlib import Path
 
 import click
@@ -20,6 +21,8 @@ def advice(error: BaseException, arguments: Sequence[str]) -> list[str]:
     advised = list(_split_options(arguments))
     if isinstance(error, PermissionError):
         advised.append("Choose another folder, or change who may read and write this one")
+    if isinstance(error, OSError) and error.errno == ENOSPC:
+        advised.append("Free some space, or write to another disk")
     context = getattr(error, "ctx", None)
     if not advised and isinstance(error, click.UsageError) and context is not None:
         advised = list(_misplaced_words(context, arguments))

@@ -9,6 +9,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
+from attrs import evolve
+
 from graspsense.core.components.registry import installed
 from graspsense.core.components.setting import worded
 from graspsense.core.components.strict import InvalidValue, ValidationFailed, plain, structured
@@ -33,16 +35,19 @@ from graspsense.sources.identified import IDENTIFIED, identified_scenes
 from graspsense.sources.simulated import number_of_trials as number_of_simulated_trials
 from graspsense.sources.simulated import simulated_objects
 from graspsense.sources.trial_source import (
+    NO_OBJECT,
     SIMULATED,
     TrialSource,
     groups_of,
     keys_without_effect,
     labelled_trials,
+    names_no_object,
     tables_without_effect,
 )
 
 SWEPT_TABLES: Final = (*PIPELINE_TABLES, "classifier", "data", "test", "judge")
 DEFAULT_CLASSIFIER: Final = "c45"
+_SEEDS: Final = "the seeds of an experiment are its key `seeds`"
 
 
 class CasePlan:
@@ -70,6 +75,10 @@ class CasePlan:
             pipelines[pipeline_of.name] = resolve(pipeline_of.pipeline, force=self.force)
         if not pipelines:
             raise ConfigError(f"{self.layer.where(('pipelines',))}: pipelines: name at least one")
+        if ("run", "seed") in self.layer.options:
+            self._complain(("run", "seed"), _SEEDS)
+        if experiment.classifiers == () and ("classifiers",) in self.layer.options:
+            self._complain(("classifiers",), "an empty list names no classifier: leave it out")
         sweep = self._sweep()
         self._check_cases(sweep, len(pipelines))
         cases = []
@@ -123,7 +132,7 @@ class CasePlan:
                 keys = [key for key in case.levels if case.levels[key] != twin.levels[key]]
             for key in keys:
                 why = (
-                    "the seeds of an experiment are its key `seeds`"
+                    _SEEDS
                     if key == "run.seed"
                     else f"the trials of {named} do not depend on what differs. Vary a key of [classifier], [judge] or "
                     f'[data] that they depend on, or simulate the trials (data.source = "{SIMULATED}")'
@@ -143,6 +152,7 @@ class CasePlan:
     def _sweep(self) -> dict[tuple[str, ...], Sequence[Any]]:
         """Return the values of each swept key, by its path."""
         sweep: dict[tuple[str, ...], Sequence[Any]] = {}
+        places: dict[KeyPath, KeyPath] = {}
 
         def take(path: tuple[str, ...], value: Any, where: tuple[str, ...]) -> None:
             if isinstance(value, Mapping):
@@ -157,11 +167,20 @@ class CasePlan:
                 )
             elif not isinstance(value, list) or not value:
                 self.complaints.append(f"{place}: give a list of values, such as [17.0, 20.0, 23.0]")
+            elif path in self.layer.options:
+                typed = self.layer.options[path]
+                self.complaints.append(
+                    f"{typed}: this experiment varies it: set sweep.{dotted(path)}, a list"
+                )
             else:
                 sweep[path] = value
+                places[path] = ("sweep", *where)
 
         for key, value in self.experiment.sweep.items():
             take(tuple(key.split(".")), value, (key,))
+        typed = self.layer.options
+        swept = {path: typed[place] for path, place in places.items() if place in typed}
+        self.layer = evolve(self.layer, options={**typed, **swept})
         return sweep
 
     def _case(
@@ -188,7 +207,7 @@ class CasePlan:
             over["gripper"] = {**fingertips, **over.get("gripper", {})}
         settings = resolve(
             pipeline.pipeline,
-            experiment=Layer(label=self.layer.label, values=over, lines=self.layer.lines),
+            experiment=evolve(self.layer, values=over),
             force=self.force,
         )
         name = ", ".join(in_a_name(key, value) for key, value in levels.items())
@@ -255,6 +274,8 @@ class CasePlan:
         self.complaints.append(self.layer.complain(InvalidValue(path, text)))
 
     def _keys(self, values: Mapping[str, Any], cls: type, table: str) -> Any:
+        if cls is TrialSource and names_no_object(values):
+            self._complain((table, "objects"), NO_OBJECT)
         try:
             return structured(values, cls, f"[{table}]")
         except ValidationFailed as misfit:

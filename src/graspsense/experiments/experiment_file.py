@@ -62,6 +62,7 @@ def read_experiment(
     for option in layers:
         merged.add((), _located(option.values, Path()), option)
     values = merged.values
+    layer = evolve(layer, options={typed_path(option): option.typed for option in layers})
     try:
         experiment = structured(values, Experiment, "an experiment")
     except ValidationFailed as misfit:
@@ -75,11 +76,8 @@ def read_experiment(
     without = Experiment(title="")
     for key in OF_CASES if experiment is not None and experiment.parts else ():
         if getattr(experiment, key) != getattr(without, key):
-            owner = merged.owner_of((key,)) or layer
-            text = (
-                "an experiment of parts has no cases of its own, so this has no effect: set it in the parts"
-            )
-            complaints.append(owner.complain(InvalidValue((key,), text)))
+            text = "an experiment of parts has no cases of its own: set it in the parts"
+            complaints.append(layer.complain(InvalidValue((key,), text)))
     if experiment is None or complaints:
         raise ConfigError("\n".join(complaints))
     if experiment.parts:

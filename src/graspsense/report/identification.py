@@ -31,7 +31,7 @@ BINS: Final = 24
 
 
 def identification_page(result: Identification, scene: str) -> Page:
-    """Return the page of an identification; `scene` is the name of the scene file."""
+    """Return the page of an identification; `scene` is the name of the scene file, empty if none was written."""
     relative = [fit.residual for fit in result.fits]
     chosen = next(candidate.terms for candidate in result.candidates if candidate.chosen)
     what = result.label or "the object"
@@ -44,7 +44,8 @@ def identification_page(result: Identification, scene: str) -> Page:
         headline=f"{what}: {chosen}",
         answer=(
             f"{len(result.fits)} squeezes, fitted to {100.0 * float(np.mean(relative)):.2g} % of the peak force (rms). "
-            f"{_differ(result.fits)}{held_out}The scene is {scene}."
+            f"{_differ(result.fits)}{held_out}"
+            + (f"The scene is {scene}." if scene else "No scene was written.")
         ),
         beside=bullets(result.refusals, "warning") + bullets(result.notes),
         sections=(

@@ -31,7 +31,9 @@ class ScaffoldKind:
     does: str
     first_command: str
     entry: str = ""
-    """The entry that its hook returns; empty for a hook that returns none."""
+    """The entry that its hook returns, and what this declares; empty for a hook with a template of its own."""
+    declares: str = ""
+    summary: str = ""
     needs: tuple[str, ...] = ()
 
 
@@ -43,24 +45,34 @@ KINDS: Final[Mapping[str, ScaffoldKind]] = {
         "a gripper, here a fake one behind the place where its driver goes",
         "graspsense run --gripper $part",
         "SensorBackendEntry",
+        'target="$package.backend:${Class}Gripper"',
+        "the gripper of our lab",
     ),
     "controller": ScaffoldKind(
         "law",
         "a control law that closes until the fingers rest",
         "graspsense run -o controller.type=$part",
         "ControllerEntry",
+        'target="$package.law:${Class}Controller"',
+        "raises its effort slowly until the fingers rest on something",
     ),
     "feature-set": ScaffoldKind(
         "features",
         "features of a grasp",
         "graspsense run -o features.type=$part -o classifier.type=none",
-        *("FeatureSetEntry", NUMPY),
+        "FeatureSetEntry",
+        'target="$package.features:${Class}Features"',
+        "greatest force and the gap at it",
+        NUMPY,
     ),
     "classifier": ScaffoldKind(
         "classifier",
         "a classifier",
         "graspsense evaluate simulated --classifier $part",
-        *("ClassifierEntry", NUMPY),
+        "ClassifierEntry",
+        'target="$package.classifier:${Class}Classifier"',
+        "the label whose mean is nearest",
+        NUMPY,
     ),
     "sim-term": ScaffoldKind(
         "term",
@@ -72,11 +84,20 @@ KINDS: Final[Mapping[str, ScaffoldKind]] = {
         "reader",
         "a reader of recorded grasps, which can be evaluated, imported and replayed",
         "graspsense evaluate $part:FOLDER",
-        *("DatasetEntry", NUMPY),
+        "DatasetEntry",
+        'recordings="$package.reader:recordings"',
+        "recorded grasps, as $part:FOLDER",
+        NUMPY,
     ),
     "observer": ScaffoldKind("observer", "an observer that logs how each grasp ended", "graspsense run"),
 }
 """The packages that `plugins new` can make, by the value of `--role`."""
+PIPELINE: Final = ScaffoldKind(
+    *("", "", "", "PipelineEntry"),
+    declares='resource="$package:pipelines/$part.toml"',
+    summary="the parts of $name together",
+)
+"""The pipeline of a package whose components fit together."""
 
 COMMON: Final = ("pyproject.toml", "README.md", ".gitignore", "tests/test_conformance.py")
 
@@ -129,10 +150,11 @@ def words_of(name: str, roles: Sequence[str]) -> dict[str, str]:
     kinds = _kinds(roles)
     part, together = name.removeprefix("graspsense-"), _together(kinds)
     # The law sends a kind of command that the package's own gripper accepts, or else the simulated gripper.
-    kind, command = ("effort", "EFFORT, effort, inf, SPEED_M_S")
+    kind, command, checks = "effort", "EFFORT, effort, inf, SPEED_M_S", ""
     if "sensor-backend" in kinds:
-        kind, command = ("velocity", "VELOCITY, -SPEED_M_S, effort, inf")
-    entries = [kind.entry for kind in kinds.values() if kind.entry] + ["PipelineEntry"] * together
+        kind, command = "velocity", "VELOCITY, -SPEED_M_S, effort, inf"
+        checks = ', unplugged={"vanishes_s": 0.5}, absent={"port": "/dev/nowhere"}'
+    entries = [kind.entry for kind in kinds.values() if kind.entry] + [PIPELINE.entry] * together
     needs = dict.fromkeys(need for kind in kinds.values() for need in kind.needs)
     tests = ["pytest>=8", *(SIMULATOR if together and "sensor-backend" not in kinds else ())]
     major, minor = map(int, __version__.split(".")[:2])
@@ -150,6 +172,7 @@ def words_of(name: str, roles: Sequence[str]) -> dict[str, str]:
         "import_effort": "    EFFORT,\n" if kind == "effort" else "",
         "import_velocity": "    VELOCITY,\n" if kind == "velocity" else "",
         "command": command,
+        "checks": checks,
         "needs": "".join(f', "{need}"' for need in needs),
         "tests": ", ".join(f'"{test}"' for test in tests),
         "core": f"graspsense>={major}.{minor},<{major}.{minor + 1}",
@@ -162,10 +185,20 @@ def words_of(name: str, roles: Sequence[str]) -> dict[str, str]:
 def plugin_module(roles: Sequence[str], words: Mapping[str, str]) -> str:
     """Return the text of `plugin.py`: the hooks of these roles."""
     kinds = _kinds(roles)
-    hooks = [_filled(f"{role}/hook.py.txt", words) for role in kinds]
+    hooks = [
+        _entry_hook(role, kind, words) if kind.entry else _filled(f"{role}/hook.py.txt", words)
+        for role, kind in kinds.items()
+    ]
     if _together(kinds):
-        hooks.append(_filled("pipeline_hook.py.txt", words))
+        hooks.append(_entry_hook("pipeline", PIPELINE, words))
     return _filled("plugin.py.txt", {**words, "hooks": "".join(hooks).rstrip()})
+
+
+def _entry_hook(role: str, kind: ScaffoldKind, words: Mapping[str, str]) -> str:
+    """Return the hook that returns the entry of a component."""
+    declared = {name: Template(getattr(kind, name)).substitute(words) for name in ("declares", "summary")}
+    hook = f"{role.replace('-', '_')}s"
+    return _filled("entry_hook.py.txt", {**words, **declared, "entry": kind.entry, "hook": hook})
 
 
 def _kinds(roles: Sequence[str]) -> dict[str, ScaffoldKind]:
@@ -234,8 +267,6 @@ def _texts(kinds: Mapping[str, ScaffoldKind], words: Mapping[str, str]) -> dict[
     if _together(kinds):
         texts[f"{package}/pipelines/{words['part']}.toml"] = _pipeline(kinds, words)
         texts["tests/test_pipeline.py"] = _filled("test_pipeline.py.txt", words)
-    if "sensor-backend" in kinds:
-        texts["tests/test_conformance.py"] = _filled("sensor-backend/test_conformance.py.txt", words)
     if "sim-term" in kinds:
         texts["scene.toml"] = _filled("sim-term/scene.toml.txt", words)
     return texts

@@ -86,6 +86,15 @@ def keys_without_effect(source: TrialSource) -> tuple[str, ...]:
     return tuple(key for kind, keys in KEYS_OF_KIND.items() if kind != source.kind for key in keys)
 
 
+NO_OBJECT: Final = "an empty list names no object: leave it out for the default ones, or name some"
+
+
+def names_no_object(keys: Mapping[str, Any]) -> bool:
+    """Return whether these keys of a source, or those of a group in it, have an empty list of objects."""
+    tables = (keys, *(group for group in keys.get("groups", ()) if isinstance(group, Mapping)))
+    return any(table.get("objects") in ([], ()) and not table.get("named") for table in tables)
+
+
 def load_trials(
     source: str = SIMULATED,
     *,
@@ -104,6 +113,8 @@ def load_trials(
     from graspsense.core.learn.copies import without_copies
     from graspsense.core.settings.resolved import resolve
 
+    if names_no_object(keys):
+        raise ConfigError(f"objects: {NO_OBJECT}")
     try:
         described = structured({**keys, "source": source}, TrialSource, source)
     except ValidationFailed as misfit:

@@ -113,20 +113,30 @@ class Layer:
     values: Mapping[str, Any]
     lines: Mapping[KeyPath, int] = field(factory=dict)
     typed: str = ""
+    options: Mapping[KeyPath, str] = field(factory=dict)
+    """What the user typed to set single keys of it, in place of their lines."""
 
     def where(self, path: KeyPath) -> str:
-        """Return the place of a key, with its line where there is one."""
+        """Return the place of a key: what the user typed, or the file with the line where there is one.
+
+        That of a table is followed by what the user typed for keys of it.
+        """
         for end in range(len(path), 0, -1):
-            if path[:end] in self.lines:
-                return f"{self.label}:{self.lines[path[:end]]}"
-        return self.label
+            if path[:end] in self.options:
+                return self.options[path[:end]]
+        ends = (end for end in range(len(path), 0, -1) if path[:end] in self.lines)
+        place = next((f"{self.label}:{self.lines[path[:end]]}" for end in ends), self.label)
+        return " with ".join(
+            [place, *(typed for key, typed in self.options.items() if key[: len(path)] == path)]
+        )
 
     def complain(self, problem: InvalidValue, known: Iterable[str] = ()) -> str:
         """Return a problem in one line: origin, key, text; `known` are the paths of the keys that there are."""
         if self.typed:
             return f"{self.typed}: {problem.words(known)}"
-        key = f"{dotted(problem.path)}: " if problem.path else ""
-        return f"{self.where(problem.path)}: {key}{problem.words(known)}"
+        where = self.where(problem.path)
+        key = f"{dotted(problem.path)}: " if problem.path and where not in self.options.values() else ""
+        return f"{where}: {key}{problem.words(known)}"
 
 
 @frozen

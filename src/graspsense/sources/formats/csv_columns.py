@@ -116,9 +116,9 @@ class CsvColumns:
                 raise DataDamaged(f"{self.path}, line {line}: {name} ({what}) is empty")
         return cells
 
-    def numbers(self, name: str) -> list[float]:
+    def numbers(self, name: str, what: str = "a feature") -> list[float]:
         """Return a column as numbers, NaN where missing. Raises DataDamaged with the line that has another text."""
-        self.column(name, "a feature")
+        self.column(name, what)
         number = self.numbers_or_times(name)
         if isinstance(number, NotNumbers):
             raise DataDamaged(f"{self.path}, line {self.lines[number.row]}: {name} is {number.words}")

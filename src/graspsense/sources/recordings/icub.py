@@ -153,9 +153,12 @@ def _locate(name: str) -> Path:
         )
     folder = given.parent / DATA_FOLDER if (given.parent / DATA_FOLDER).is_dir() else given.parent
     grasps = [p.name for p in folder.glob("*.txt")]
-    there = f"{folder} contains {len(grasps)} files *.txt, but none with this name"
+    there = f"the folder {folder} has no such file"
     there = there if folder.is_dir() else f"there is no folder {folder}"
-    raise ConfigError(f"no file {given}: {there}.{suggestion(given.name, grasps)}")
+    raise ConfigError(
+        f"no grasp {given}: {there}. Name a file of the iCub Grasp Dataset with its folder, as in "
+        f"FOLDER/full_vitamin_water_1.txt.{suggestion(given.name, grasps)}"
+    )
 
 
 def _numbers(path: Path, number: int, line: str, what: str, count: int) -> list[float]:

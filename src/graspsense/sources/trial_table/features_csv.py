@@ -313,7 +313,7 @@ def _ranks(columns: CsvColumns, order: str | None) -> tuple[int, ...]:
     """Return the position of each trial in the order of recording. Raises DataDamaged."""
     if order is None:
         return tuple(range(len(columns)))
-    values = columns.numbers(order)
+    values = columns.numbers(order, "the order")
     if any(math.isnan(value) for value in values):
         raise DataDamaged(f"{columns.path}: a cell of the column {order!r} (the order) is empty")
     return tuple(np.argsort(np.argsort(values, kind="stable"), kind="stable").tolist())
