@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from math import inf, nan
+from textwrap import dedent
 from typing import Literal
 
 import parts
 import pytest
 from attrs import field, frozen
 from cases import every_case
+from commands import python
 from parts import GentleState, Hand, HandConfig, Peak, PeakConfig
 
 from graspsense.core.components.registry import Component, IsolatedPlugins
@@ -201,3 +203,29 @@ def test_the_wiring_knows_the_channels_of_the_fitted_fingers():
     hand = plugins.find("sensor-backend", "fingers")
     assert hand.channels_vary()
     assert [channel.name for channel in hand.declared().channels] == ["gap", "velocity"]
+
+
+SLOW_LAW = """
+    from attrs import frozen
+    from graspsense.core.components.step_params import params_of
+    from graspsense.simulator_api import compile_function
+    @frozen
+    class SlowConfig:
+        speed_m_s: float = 0.5
+        ticks: int = 3
+    def law(params):
+        return params.speed_m_s * params.ticks
+    if __name__ == "__main__":
+        compiled = compile_function(law)
+        print(compiled(params_of(SlowConfig())), sum(compiled.stats.cache_hits.values()))
+"""
+
+
+@pytest.mark.slow
+def test_a_law_with_the_numbers_of_its_config_is_compiled_once_and_then_loaded(tmp_path):
+    """Another process finds the machine code, although no module defines the type of the parameters."""
+    (tmp_path / "lab_slow.py").write_text(dedent(SLOW_LAW))
+    environ = {"PATH": "", "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    said = [python("lab_slow.py", cwd=tmp_path, env=environ, check=True).stdout for _ in range(2)]
+
+    assert said == ["1.5 0\n", "1.5 1\n"]

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+import textwrap
+
+import pytest
 from cases import every_case
 from grippers import Scripted, bottle, squeezing
 
@@ -11,6 +16,9 @@ from graspsense.core.grasp.runner import run_grasp
 from graspsense.core.values.errors import DeviceLost
 from graspsense.core.values.signals import Phase
 from graspsense.plugins.controllers.hybrid import HybridConfig, HybridController
+from graspsense.recording.reader import read_recorded
+from graspsense.store.recover import recover_store
+from graspsense.store.store import Store
 
 
 def step(params, state, reading):
@@ -66,6 +74,44 @@ def test_a_grasp_that_is_cut_off_keeps_its_events(how, outcome):
     grasp = grasped(HybridController, type("Lost", (Lost,), {"how": how}))
     assert grasp.outcome.words == outcome
     assert [event.what for event in grasp.trace.events] == ["contact"]
+
+
+KILLED = """
+    import os, signal, sys
+    from graspsense import load_pipeline
+    from graspsense.core.components.registry import installed
+    from graspsense.store.record_grasp import record_grasp
+    from graspsense.store.store import Store
+
+    class Killer:
+        ticks = 0
+
+        def take(self, reading, phase, command):
+            self.ticks += phase >= 3
+            if self.ticks == 200:
+                os.kill(os.getpid(), signal.SIGKILL)
+
+    settings = load_pipeline(options=["gripper.object=block", "classifier.type=none"]).settings
+    with Store.open(sys.argv[1]) as store:
+        record_grasp(store, settings, installed(), labels={}, origin="run", sinks=[Killer()])
+"""
+
+
+@pytest.mark.slow
+def test_a_killed_grasp_keeps_its_events(tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(KILLED), str(tmp_path / "trials")], check=False, timeout=120
+    )
+    assert done.returncode == -9
+    with Store.open(tmp_path / "trials") as store:
+        while (recovered := recover_store(store))[0].what == "busy":
+            pass
+        assert [recovery.what for recovery in recovered] == ["recovered"]
+        recording = store.trial(1).recording
+    trace = read_recorded(recording).trace()
+    (event,) = trace.events
+    assert (event.what, event.source, event.phase) == ("contact", "controller", Phase.SQUEEZE)
+    assert event.t_s == trace.t_s[trace.phase == Phase.SQUEEZE][0]
 
 
 def test_a_part_of_a_trace_has_the_events_until_then():
