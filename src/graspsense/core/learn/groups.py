@@ -30,6 +30,7 @@ from attrs import evolve
 from graspsense.core.components.caller import option
 from graspsense.core.learn.clumps import NEAREST, mean_ranks, parts_of_clumps
 from graspsense.core.learn.labelled import class_of
+from graspsense.core.learn.scaling import mean_and_deviation, scaling_of
 from graspsense.core.values.errors import counted
 
 if TYPE_CHECKING:
@@ -221,13 +222,19 @@ def _near_copies(labelled: Labelled) -> tuple[Numbers, list[str]]:
 
 
 def _scaled(values: Values) -> Values:
-    """Return the features without missing values, those with the most different ones, by their standard deviation."""
+    """Return the features without missing values, those with the most different ones, scaled.
+
+    Where fewer than two are without, all count, and a missing value is that of a trial at random: the same one for all
+    would make trials alike.
+    """
     whole = values[:, ~np.isnan(values).any(axis=0)]
+    if whole.shape[1] < 2:
+        whole, rng = values[:, ~np.isnan(values).all(axis=0)], np.random.default_rng(0)
+        for column in whole.T:
+            missing = np.isnan(column)
+            column[missing] = rng.choice(column[~missing], int(missing.sum()))
     finest = np.argsort([-len(np.unique(column)) for column in whole.T], kind="stable")[:_MOST_FEATURES]
-    whole = whole[:, finest] - whole[:, finest].mean(axis=0)
-    spread = whole.std(axis=0)
-    scaled: Values = whole[:, spread > 0.0] / spread[spread > 0.0]
-    return scaled
+    return scaling_of(whole[:, finest], mean_and_deviation).ready(whole[:, finest])
 
 
 def cells_in_range(distinct: NDArray[np.float64]) -> float:
