@@ -495,6 +495,13 @@ def numbers_with_unit(cells: Sequence[str], of_column: str = "") -> tuple[Sequen
     return (numbers, unit) if known else (cells, of_column)
 
 
+def unit_in(heading: str) -> str:
+    """Return the unit behind a name: `Load [N]` or `Load (N)`."""
+    match = re.fullmatch(r".*[\[(](.*)[\])]", heading)
+    unit = match[1].strip() if match else ""
+    return unit if unit.lower() in UNITS else ""
+
+
 def _json_table(path: Path, lines: Sequence[Line], ended: bool) -> TextTable:
     """Return the table of a file with one JSON object a line. Raises DataDamaged."""
     written = [(number, line) for number, line in lines if line.strip()]

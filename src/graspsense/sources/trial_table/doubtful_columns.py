@@ -71,8 +71,8 @@ _MOSTLY: Final = 0.75
 """Share of the lines of each label from which on a value may be the setting that this label was recorded with."""
 _EVEN: Final = 0.005
 """Probability that drawn values have numbers of lines as even as those of objects, below which it is told."""
-_NEAR: Final = 0.3
-"""Largest distance of a number from the whole one that it is rounded to."""
+_NEAR: Final = 3.0
+"""Standard errors by which the mean of noise is away from zero at most."""
 _ROUNDED_SUM: Final = 0.02
 """Largest error of a sum of probabilities."""
 _ENOUGH_LINES: Final = 30
@@ -224,10 +224,12 @@ def mostly_says_the_label(values: Sequence[Hashable], labels: Sequence[str], sha
 
 
 def is_code(values: Sequence[Any], labels: Sequence[str]) -> bool:
-    """Return whether the values of each label are near to a whole number of its own, and these follow each other."""
+    """Return whether the values of each label are a whole number of its own with noise, and these follow each other."""
     codes = np.round(values)
-    near = bool((np.abs(codes - values) <= _NEAR).all())
-    return near and np.ptp(codes) == len(set(labels)) - 1 and says_the_label(codes.tolist(), labels)
+    if np.ptp(codes) != len(set(labels)) - 1 or not says_the_label(codes.tolist(), labels):
+        return False
+    noise = [np.subtract(values, codes)[codes == code] for code in np.unique(codes)]
+    return all(abs(part.mean()) * len(part) ** 0.5 <= _NEAR * part.std() for part in noise)
 
 
 def is_result(name: str, labels: Sequence[str]) -> bool:
