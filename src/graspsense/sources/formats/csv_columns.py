@@ -1,7 +1,7 @@
 """A table of trials in a text file: named columns of text and numbers, with the line number of each row.
 
-A name can be followed by its unit: `p_first [m]`; one in round brackets stays a part of the name. A first column without
-a name, which pandas writes, is the index.
+A name can be followed by its unit: `p_first [m]`; one in round brackets stays a part of the name. A first column
+without a name, which pandas writes, is the index.
 """
 
 from __future__ import annotations

@@ -88,8 +88,7 @@ _PROPORTIONAL: Final = 1.0 - 1e-6
 """Correlation with the number to predict from which on a column is that number in another unit."""
 _DOUBTS: Final[Mapping[str, Mapping[str, str]]] = {
     "If it is the label or a prediction in other words, or a setting of the experiment, it reveals the labels: ": {
-        "same": "all trials of a label have the same value",
-        "mostly": "most trials of each label have the same one of its few values",
+        "same": "all or most trials of each label have the same one of its few values",
         "probabilities": "these are between 0 and 1, their sum is 1, and most trials of each label have the largest "
         "one in one of them",
         "result": "its name is that of the result of a model or a test, or has a label in it",
@@ -159,11 +158,13 @@ def _of_recording(columns: CsvColumns, name: str, labels: Sequence[str]) -> Iter
     """Yield why the texts of a column may tell of labels, devices or objects."""
     cells, nominal, is_number = columns.cells[name], columns.is_nominal(name), is_count(columns.units[name])
     values = columns.texts(name) if nominal else columns.numbers(name)
-    if says_the_label(cells, labels) or (not nominal and is_number and is_code(values, labels)):
+    if (
+        says_the_label(cells, labels)
+        or mostly_says_the_label(cells, labels)
+        or (not nominal and is_number and is_code(values, labels))
+    ):
         yield "same"
         return
-    if mostly_says_the_label(cells, labels):
-        yield "mostly"
     if mostly_says_the_label([value == "" or value != value for value in values], labels, 1.0 - _FEW):
         yield "missing"
     if name_objects(cells, labels) or (is_number and values_have_one_label(values, labels)):
