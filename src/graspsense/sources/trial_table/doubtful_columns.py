@@ -158,11 +158,8 @@ def _of_recording(columns: CsvColumns, name: str, labels: Sequence[str]) -> Iter
     """Yield why the texts of a column may tell of labels, devices or objects."""
     cells, nominal, is_number = columns.cells[name], columns.is_nominal(name), is_count(columns.units[name])
     values = columns.texts(name) if nominal else columns.numbers(name)
-    if (
-        says_the_label(cells, labels)
-        or mostly_says_the_label(cells, labels)
-        or (not nominal and is_number and is_code(values, labels))
-    ):
+    coded = not nominal and is_number and is_code(values, labels)
+    if coded or says_the_label(cells, labels) or mostly_says_the_label(cells, labels):
         yield "same"
         return
     if mostly_says_the_label([value == "" or value != value for value in values], labels, 1.0 - _FEW):
@@ -247,17 +244,15 @@ def digits_tell_labels(values: Numbers, labels: Sequence[str]) -> bool:
 
     Only digits that were rounded count, and not those of numbers of another magnitude.
     """
-    given = [(label, value) for label, value in zip(labels, values.tolist(), strict=True) if value == value]
-    counts, different = Counter(label for label, _ in given), Counter(label for label, _ in set(given))
+    given: dict[str, list[float]] = {}
+    for label, value in zip(labels, values.tolist(), strict=True):
+        given.setdefault(label, []).extend([value] if value == value else [])
     written: dict[str, list[tuple[int, int]]] = {}
-    for label, value in given:
-        if counts[label] >= LEAST_LINES and different[label] >= _OFTEN:
-            number = Decimal(repr(value)).normalize().as_tuple()
-            written.setdefault(label, []).append((-int(number.exponent), len(number.digits)))
-    most = {
-        label: (max(places for places, _ in all_of), max(digits for _, digits in all_of))
-        for label, all_of in written.items()
-    }
+    for label, numbers in given.items():
+        if len(numbers) >= LEAST_LINES and len(set(numbers)) >= _OFTEN:
+            decimals = [Decimal(repr(value)).normalize().as_tuple() for value in numbers]
+            written[label] = [(-int(number.exponent), len(number.digits)) for number in decimals]
+    most = {label: (max(all_of)[0], max(digits for _, digits in all_of)) for label, all_of in written.items()}
     return any(
         places < most[other][0]
         and digits < min(most[other][1], _ROUNDED)
