@@ -259,7 +259,7 @@ DOUBTFUL = {
         "handler",
         ["CD"[i % 2] if i in (3, 40) else "AB"[i > 29] for i in range(N)],
     ),
-    "a code that noise has": ("level", [(i > 29) + RNG.normal(0.0, 0.05) for i in range(N)]),
+    "a code that noise has": ("level", [(i > 29) + RNG.uniform(-0.45, 0.45) for i in range(N)]),
     "a result of a test": ("p_value", RNG.uniform(size=N).round(4)),
     "a result of a model": ("knn_distance", [*NOISE[:30], *(value + 2.0 for value in NOISE[30:])]),
     "what a model says of a label": ("dist_to_can", [*NOISE[:30], *(value + 4.0 for value in NOISE[30:])]),

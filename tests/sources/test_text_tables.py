@@ -119,7 +119,9 @@ VARIANTS = {
     "names in a comment before another one": [f"# {HEADER}", "# recorded in room 4", *ROWS],
     "two cells before, units behind": ["Key Word,Value", 'Units,"N","mm"', HEADER, "sec,mm,N,N", *ROWS],
     "Orange": [HEADER, "continuous,continuous,c,c", ",,class,", *ROWS],
-    "texts of a spreadsheet": [re.sub("[^,]+", r'="\g<0>"', line) for line in [HEADER, *ROWS]],
+    "texts of a spreadsheet": [
+        re.sub("[^,]+", ('="\\g<0>"', '"=""\\g<0>"""')[k % 2], line) for k, line in enumerate([HEADER, *ROWS])
+    ],
     "lists of one number": [HEADER, *(re.sub(r"(?<=,)([^,]+)", r"[\1]", row) for row in ROWS)],
     "milliseconds": stamped(lambda k: 1774749599000 + 10 * k),
     "nanoseconds": stamped(lambda k: 1774749599000000000 + 10_000_000 * k),

@@ -277,28 +277,25 @@ def _row_indices(rows: ArrayLike, n_rows: int) -> Indices:
 
 
 def _nominal_columns(X: Any, nominal: Sequence[Any] | None) -> set[int]:
-    names = [str(name) for name in X.columns] if hasattr(X, "columns") else None
+    names = [str(name) for name in X.columns] if hasattr(X, "columns") else []
     if nominal is None:
-        if names is None:
-            return set()
-        return {i for i, kind in enumerate(X.dtypes) if str(kind) == "category"}
-    asked, n_columns = list(nominal), np.shape(X)[-1]
-    is_mask = bool(asked) and all(isinstance(item, bool | np.bool_) for item in asked)
-    if is_mask and len(asked) == n_columns:
-        return {i for i, item in enumerate(asked) if item}
-    if asked and all(isinstance(item, str) for item in asked):
-        missing = [item for item in asked if names is None or item not in names]
-        if names is None or missing:
+        return {i for i, kind in enumerate(X.dtypes) if str(kind) == "category"} if names else set()
+    asked, columns = np.asarray(nominal), np.arange(np.shape(X)[-1])
+    if asked.dtype.kind == "U":
+        missing = [name for name in asked.tolist() if name not in names]
+        if missing:
             raise ValueError(
                 f"nominal names no columns: {missing}; the columns are {names or 'without names'}"
             )
-        return {names.index(item) for item in asked}
-    chosen = {int(item) for item in asked}
-    if is_mask or not chosen <= set(range(n_columns)):
+        return {names.index(name) for name in asked.tolist()}
+    if asked.dtype == bool and asked.shape == columns.shape:
+        asked = columns[asked]
+    if asked.dtype == bool or not np.isin(asked, columns).all():
         raise ValueError(
-            f"nominal is {asked}: name some of the columns 0..{n_columns - 1}, or give a mask of {n_columns} booleans"
+            f"nominal is {list(nominal)}: name some of the columns 0..{len(columns) - 1}, or give a mask of "
+            f"{len(columns)} booleans"
         )
-    return chosen
+    return {int(column) for column in asked}
 
 
 def _columns(X: Any) -> list[Any]:
@@ -330,10 +327,7 @@ def _categories(column: Any) -> list[Any]:
 
 def _codes(column: Any, categories: list[Any]) -> Reals:
     place = {value: float(code) for code, value in enumerate(categories)}
-    missing = float("nan")
-    return np.array(
-        [missing if _is_missing(value) else place.get(value, missing) for value in column.tolist()]
-    )
+    return np.array([place.get(value, float("nan")) for value in column.tolist()])
 
 
 def _numbers(column: Any, index: int) -> Reals:

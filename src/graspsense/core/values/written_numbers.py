@@ -283,7 +283,7 @@ def _read(cells: Sequence[str], common: int, of_file: int, *, decimal_commas: bo
     else:
         return _values(cells, common)
     mark = "," if common & POINT == 0 else "."
-    row = next(k for k, cell in enumerate(cells) if mark in cell)
+    row = next(k for k, cell in enumerate(cells) if mark in cell and not is_missing(cell))
     able = [notation for notation in _NOTATIONS if _notations(cells[row]) & notation]
     readings = " or ".join(dict.fromkeys(f"{_values([cells[row]], notation)[0]:.15g}" for notation in able))
     return NotNumbers(
@@ -328,7 +328,7 @@ def _one_mark_of_two(cells: Sequence[str]) -> bool:
 
     Of thousands with decimals, some have both marks.
     """
-    marks = [re.sub("[^,.]", "", cell) for cell in cells]
+    marks = ["" if is_missing(cell) else re.sub("[^,.]", "", cell) for cell in cells]
     return {*marks} - {""} == {",", "."} and (
         marks.count(",") >= _FEW or all(len(cell) - cell.find(".") == 4 for cell in cells if "." in cell)
     )

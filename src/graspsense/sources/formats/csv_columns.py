@@ -1,6 +1,7 @@
 """A table of trials in a text file: named columns of text and numbers, with the line number of each row.
 
-A name can be followed by its unit: `p_first [m]`. A first column without a name, which pandas writes, is the index.
+A name can be followed by its unit: `p_first [m]`; one in round brackets stays a part of the name. A first column
+without a name, which pandas writes, is the index.
 """
 
 from __future__ import annotations
@@ -36,6 +37,7 @@ from graspsense.sources.formats.text_table import (
     numbers_with_unit,
     read_lines,
     table_of,
+    unit_in,
 )
 
 _INDEXES: Final = (INDEX, "Unnamed: 0")
@@ -82,7 +84,7 @@ class CsvColumns:
                 renamed.append(name)
             self.names.append(name)
             self.cells[name] = [text_of_cell(cell) for cell in column]
-            self.units[name] = numbers_with_unit(self.cells[name], unit or unit_of_line)[1]
+            self.units[name] = numbers_with_unit(self.cells[name], unit or unit_of_line or unit_in(given))[1]
         if 2 * len(renamed) > len(self.names):
             raise DataDamaged(
                 f"{path}: most columns have the name of another one, or none, in line {table.named_in}: a table of "

@@ -29,13 +29,13 @@ from graspsense.core.values.written_times import seconds_since_first
 from graspsense.sources.formats.patterns import regular_expression
 from graspsense.sources.formats.table import ColumnTable, Numbers
 from graspsense.sources.formats.text_table import (
-    UNITS,
     Line,
     TextTable,
     distinct_names,
     numbers_with_unit,
     read_lines,
     table_of,
+    unit_in,
 )
 
 _Part = tuple[dict[str, str], Sequence[Line]]
@@ -118,7 +118,7 @@ def _columns(path: Path, fields: dict[str, str], table: TextTable, *, several: b
     texts: dict[str, Sequence[str]] = {}
     not_numbers: dict[str, str] = {}
     seconds: dict[str, str] = {}
-    units = {name: _unit_in(name) or unit for name, unit in zip(cells, table.units, strict=True)}
+    units = {name: unit_in(name) or unit for name, unit in zip(cells, table.units, strict=True)}
     for name in cells:
         plain, units[name] = numbers_with_unit(cells[name], units[name])
         if plain is not cells[name]:
@@ -168,10 +168,3 @@ def _lists(path: Path, name: str, cells: Sequence[str]) -> Numbers | None:
     if too_many := CELLS.exceeded(sum(len(cell.replace(",", " ").split()) for cell in cells)):
         raise DataDamaged(f"{path}: the lists of column {name!r} have {too_many}")
     return rows_of_lists(cells)
-
-
-def _unit_in(heading: str) -> str:
-    """Return the unit behind a name: `Load [N]` or `Load (N)`."""
-    match = re.fullmatch(r".*[\[(](.*)[\])]", heading)
-    unit = match[1].strip() if match else ""
-    return unit if unit.lower() in UNITS else ""

@@ -78,7 +78,8 @@ _OF_EUROPE: Final = 4
 _SHOWN_BYTES: Final = 60
 _ZEROS: Final = 10
 """One byte of so many is zero, at every second place only, in UTF-16 of a table."""
-_SHOWN_AS_IT_IS: Final = re.compile(r'(^|[;,\t])="')
+_SHOWN_AS_IT_IS: Final = re.compile('="(.*)"')
+"""A cell that a spreadsheet shall show as it is: ="0.5"."""
 _WITH_UNIT: Final = re.compile(r"(.*[0-9.])\s*([^\s0-9]+)")
 _SAMPLED: Final = 400
 """Lines from which the separator and the kinds of the columns are found."""
@@ -151,9 +152,7 @@ class _Layout:
         given = _SEPARATOR_LINE.fullmatch(written[0][1]) if written else None
         if given:
             written = written[1:]
-        # A cell that a spreadsheet shall show as it is: ="0.5"
-        if any('="' in line for _, line in written):
-            written = [(number, _SHOWN_AS_IT_IS.sub(r'\1"', line)) for number, line in written]
+        self.shown_as_it_is = any('="' in line for _, line in written)
         self.comments, plain = _comments_and_others(written)
         if all(re.fullmatch(r"\s*\|.*\|\s*", line) for _, line in plain):
             plain = [(number, line.strip()[1:-1]) for number, line in plain]
@@ -202,7 +201,10 @@ class _Layout:
         reader = csv.reader((line + "\n" for _, line in lines), delimiter=self.separator, strict=True)
         try:
             for row in reader:
-                yield lines[reader.line_num - 1][0], list(map(str.strip, row))
+                cells = list(map(str.strip, row))
+                if self.shown_as_it_is:
+                    cells = [_SHOWN_AS_IT_IS.sub(r"\1", cell) for cell in cells]
+                yield lines[reader.line_num - 1][0], cells
         except (csv.Error, ValueError) as error:
             number = lines[max(0, min(reader.line_num, len(lines)) - 1)][0]
             raise DataDamaged(f"{self.path}, line {number}: {error}") from None
@@ -493,6 +495,13 @@ def numbers_with_unit(cells: Sequence[str], of_column: str = "") -> tuple[Sequen
         numbers.append(match[1] if match else cell)
     known = unit.lower() in UNITS if len(unit) > 1 else unit in _SINGLE_UNITS
     return (numbers, unit) if known else (cells, of_column)
+
+
+def unit_in(heading: str) -> str:
+    """Return the unit behind a name: `Load [N]` or `Load (N)`."""
+    match = re.fullmatch(r".*[\[(](.*)[\])]", heading)
+    unit = match[1].strip() if match else ""
+    return unit if unit.lower() in UNITS else ""
 
 
 def _json_table(path: Path, lines: Sequence[Line], ended: bool) -> TextTable:

@@ -71,8 +71,8 @@ _MOSTLY: Final = 0.75
 """Share of the lines of each label from which on a value may be the setting that this label was recorded with."""
 _EVEN: Final = 0.005
 """Probability that drawn values have numbers of lines as even as those of objects, below which it is told."""
-_NEAR: Final = 0.3
-"""Largest distance of a number from the whole one that it is rounded to."""
+_NEAR: Final = 3.0
+"""Standard errors by which the mean of noise is away from zero at most."""
 _ROUNDED_SUM: Final = 0.02
 """Largest error of a sum of probabilities."""
 _ENOUGH_LINES: Final = 30
@@ -88,8 +88,7 @@ _PROPORTIONAL: Final = 1.0 - 1e-6
 """Correlation with the number to predict from which on a column is that number in another unit."""
 _DOUBTS: Final[Mapping[str, Mapping[str, str]]] = {
     "If it is the label or a prediction in other words, or a setting of the experiment, it reveals the labels: ": {
-        "same": "all trials of a label have the same value",
-        "mostly": "most trials of each label have the same one of its few values",
+        "same": "all or most trials of each label have the same one of its few values",
         "probabilities": "these are between 0 and 1, their sum is 1, and most trials of each label have the largest "
         "one in one of them",
         "result": "its name is that of the result of a model or a test, or has a label in it",
@@ -159,11 +158,10 @@ def _of_recording(columns: CsvColumns, name: str, labels: Sequence[str]) -> Iter
     """Yield why the texts of a column may tell of labels, devices or objects."""
     cells, nominal, is_number = columns.cells[name], columns.is_nominal(name), is_count(columns.units[name])
     values = columns.texts(name) if nominal else columns.numbers(name)
-    if says_the_label(cells, labels) or (not nominal and is_number and is_code(values, labels)):
+    coded = not nominal and is_number and is_code(values, labels)
+    if coded or says_the_label(cells, labels) or mostly_says_the_label(cells, labels):
         yield "same"
         return
-    if mostly_says_the_label(cells, labels):
-        yield "mostly"
     if mostly_says_the_label([value == "" or value != value for value in values], labels, 1.0 - _FEW):
         yield "missing"
     if name_objects(cells, labels) or (is_number and values_have_one_label(values, labels)):
@@ -224,10 +222,12 @@ def mostly_says_the_label(values: Sequence[Hashable], labels: Sequence[str], sha
 
 
 def is_code(values: Sequence[Any], labels: Sequence[str]) -> bool:
-    """Return whether the values of each label are near to a whole number of its own, and these follow each other."""
+    """Return whether the values of each label are a whole number of its own with noise, and these follow each other."""
     codes = np.round(values)
-    near = bool((np.abs(codes - values) <= _NEAR).all())
-    return near and np.ptp(codes) == len(set(labels)) - 1 and says_the_label(codes.tolist(), labels)
+    if np.ptp(codes) != len(set(labels)) - 1 or not says_the_label(codes.tolist(), labels):
+        return False
+    noise = [np.subtract(values, codes)[codes == code] for code in np.unique(codes)]
+    return all(abs(part.mean()) * len(part) ** 0.5 <= _NEAR * part.std() for part in noise)
 
 
 def is_result(name: str, labels: Sequence[str]) -> bool:
@@ -244,17 +244,15 @@ def digits_tell_labels(values: Numbers, labels: Sequence[str]) -> bool:
 
     Only digits that were rounded count, and not those of numbers of another magnitude.
     """
-    given = [(label, value) for label, value in zip(labels, values.tolist(), strict=True) if value == value]
-    counts, different = Counter(label for label, _ in given), Counter(label for label, _ in set(given))
+    given: dict[str, list[float]] = {}
+    for label, value in zip(labels, values.tolist(), strict=True):
+        given.setdefault(label, []).extend([value] if value == value else [])
     written: dict[str, list[tuple[int, int]]] = {}
-    for label, value in given:
-        if counts[label] >= LEAST_LINES and different[label] >= _OFTEN:
-            number = Decimal(repr(value)).normalize().as_tuple()
-            written.setdefault(label, []).append((-int(number.exponent), len(number.digits)))
-    most = {
-        label: (max(places for places, _ in all_of), max(digits for _, digits in all_of))
-        for label, all_of in written.items()
-    }
+    for label, numbers in given.items():
+        if len(numbers) >= LEAST_LINES and len(set(numbers)) >= _OFTEN:
+            decimals = [Decimal(repr(value)).normalize().as_tuple() for value in numbers]
+            written[label] = [(-int(number.exponent), len(number.digits)) for number in decimals]
+    most = {label: (max(all_of)[0], max(digits for _, digits in all_of)) for label, all_of in written.items()}
     return any(
         places < most[other][0]
         and digits < min(most[other][1], _ROUNDED)

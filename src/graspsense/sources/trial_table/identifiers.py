@@ -76,8 +76,6 @@ _SPACED: Final = 30
 """Number of lines from which on steps that are alike show a clock, in whatever order the lines are."""
 _ALIKE: Final = 0.35
 """The same ratio of a clock whose lines are in any order: of 30 measurements it is less once in a million."""
-_ENDS: Final = 2
-"""Objects that may have fewer lines than the others: the first and the last one; or the last one of each label."""
 _EVEN: Final = 1e-3
 """Probability that drawn values have numbers of lines as even as those of objects."""
 _TWO: Final = 1.9
@@ -361,8 +359,8 @@ def _hardly_repeats(n: int, distinct: int, cells: float) -> bool:
 def name_objects(values: Sequence[Hashable], labels: Sequence[str]) -> bool:
     """Return whether values name objects: each belongs to one label, and all have as many lines, or one block.
 
-    Where two labels meet, an object may have lines of both. Objects at the ends may have fewer lines, and others may if
-    all have nearly as many.
+    Where two labels meet, an object may have lines of both. As many objects as there are labels may have fewer lines,
+    as the last one of each; others may if all have nearly as many.
     """
     counts = Counter(values)
     objects = len(counts)
@@ -372,7 +370,7 @@ def name_objects(values: Sequence[Hashable], labels: Sequence[str]) -> bool:
     most = max(counts.values())
     fewer = sum(count < most for count in counts.values())
     in_blocks = sum(1 for _ in groupby(values)) == objects
-    alike = fewer <= max(_ENDS, among) or are_even([*counts.values()])
+    alike = fewer <= among or are_even([*counts.values()])
     return most > 1 and (alike or (in_blocks and min(counts.values()) > 1))
 
 
