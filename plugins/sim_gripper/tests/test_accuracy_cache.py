@@ -2,6 +2,7 @@
 
 import json
 import os
+import pwd
 
 import pytest
 from attrs import evolve
@@ -55,6 +56,23 @@ def again(config=CONFIG, spec=None, **settings):
         create("controller", "hybrid", closing_speed_m_s=0.05, **settings), RunConfig()
     )
     return selection.select(Problem(config, spec or shell()), controller)
+
+
+@pytest.mark.slow
+def test_memory_finds_a_model_by_content_and_not_by_object(trials):
+    model = select()
+    # Another object of Python with the same content, and other settings that no model depends on.
+    assert again(spec=shell()) is again(evolve(CONFIG, noise_counts=9.0)) is model
+    assert len(trials) == 1
+
+
+@pytest.mark.slow
+def test_memory_is_bounded(monkeypatch):
+    monkeypatch.setattr(cache, "MAX_IN_MEMORY", 2)
+    select()
+    for k in range(3):
+        again(spec=shell(1000.0 + k))
+    assert len(cache._IN_MEMORY) == 2
 
 
 def test_the_next_process_finds_what_was_selected(trials, folder):
@@ -125,7 +143,40 @@ def test_one_that_another_user_could_have_written_is_not_used(trials, folder, ch
         changed.chmod(mode)
 
 
+@pytest.mark.slow
+def test_with_any_mask_of_the_user_what_is_kept_is_used(trials):
+    mask = os.umask(0)
+    select()
+    os.umask(mask)
+    select()
+    assert len(trials) == 1
+
+
 def test_a_folder_that_cannot_be_made_costs_nothing_but_time(trials, folder):
     folder.parent.write_text("no folder")
+    assert select() == select()
+    assert len(trials) == 2
+
+
+@pytest.mark.slow
+def test_the_older_half_makes_room(monkeypatch, folder):
+    monkeypatch.setattr(cache, "MAX_FILES", 4)
+    for k in range(4):
+        select(spec=shell(1000.0 + k))
+        newest = max(folder.iterdir(), key=lambda path: path.stat().st_mtime_ns)
+        os.utime(newest, (k, k))
+    select(spec=shell(1900.0))
+    assert len(list(folder.iterdir())) == 3
+    assert min(path.stat().st_mtime for path in folder.iterdir()) == 2.0
+
+
+@pytest.mark.slow
+def test_without_a_home_nothing_is_kept_and_every_process_selects_anew(trials, monkeypatch):
+    def unknown(uid):
+        raise KeyError(f"getpwuid(): uid not found: {uid}")
+
+    monkeypatch.delenv("XDG_CACHE_HOME")
+    monkeypatch.delenv("HOME", raising=False)
+    monkeypatch.setattr(pwd, "getpwuid", unknown)
     assert select() == select()
     assert len(trials) == 2

@@ -1,10 +1,12 @@
 """Many grasps at once: the same for any number of workers, whoever runs them, with the user's settings."""
 
+import io
 import math
 import os
 import signal
 import subprocess
 import sys
+import tracemalloc
 import warnings
 from collections import Counter
 from importlib.util import find_spec
@@ -20,6 +22,7 @@ from hypothesis import strategies as st
 
 from graspsense.core.components.registry import IsolatedPlugins
 from graspsense.core.components.run_config import RunConfig
+from graspsense.core.drivers import grasp_process
 from graspsense.core.grasp.runner import run_grasp
 from graspsense.core.values.errors import UnknownName
 from graspsense.gripper_api import Outcome
@@ -41,7 +44,7 @@ from graspsense_sim_gripper.run import buffers
 from graspsense_sim_gripper.run.backend import SimBackend
 from graspsense_sim_gripper.run.batch import threads
 from graspsense_sim_gripper.run.batch.job import Job, grasp_plain
-from graspsense_sim_gripper.run.batch.scenes import Scenes
+from graspsense_sim_gripper.run.batch.scenes import Scenes, draw_numbers
 from graspsense_sim_gripper.run.batch.threads import SLICE, slices_of
 from graspsense_sim_gripper.run.batch.worker import PlainProcess
 from graspsense_sim_gripper.run.compiled import loop_code
@@ -117,6 +120,16 @@ def test_the_number_of_workers_decides_nothing_to_the_bit():
     for a, b in zip(many(odd, compiled=False), many(odd, compiled=True), strict=True):
         np.testing.assert_allclose(b.trace.force_left_n, a.trace.force_left_n, rtol=1e-9, atol=1e-12)
         assert types_of_states(b) == types_of_states(a)
+
+
+@slow_compiled
+def test_what_is_drawn_may_keep_a_column_of_the_trace():
+    scenes, seeds = mixed(SLICE)
+    kept = many(scenes, seeds, compiled=True, extract=lambda trace: trace.gap_m, traces=False)
+    whole = many(scenes, seeds, compiled=True)
+
+    for grasp, other in zip(kept, whole, strict=True):
+        assert grasp.extracted.tobytes() == other.trace.gap_m.tobytes()
 
 
 @slow_compiled
@@ -373,6 +386,13 @@ def test_a_process_that_is_killed_leaves_its_grasps_to_this_one(monkeypatch):
     assert [bits(grasp.trace) for grasp in done] == [bits(grasp.trace) for grasp in here]
 
 
+def test_an_answer_that_breaks_off_is_no_answer():
+    with pytest.raises(EOFError):
+        grasp_process._read_line(io.BytesIO(b'{"done": []'))
+    with pytest.raises(EOFError):
+        grasp_process._read(io.BytesIO(b"abc"), 4)
+
+
 def test_what_is_not_all_in_names_and_values_is_not_handed_over():
     altered = create("controller", "hybrid")
     numbers = altered.params()
@@ -442,6 +462,25 @@ def test_few_grasps_are_compiled_only_if_their_code_is_on_disk_or_others_came_be
     assert is_compiled(2, kept=False)
 
 
+# The first one compiles, for half a minute where an earlier run has left nothing on disk.
+@pytest.mark.slow
+@pytest.mark.parametrize("kept", [True, False])
+def test_drawing_and_measuring_are_compiled_for_many_grasps_or_if_their_code_is_on_disk(monkeypatch, kept):
+    monkeypatch.setattr(threads, "WORTH_COMPILING", 1)
+    monkeypatch.setattr(threads, "WORTH_COMPILING_DRAWING", 4)
+    monkeypatch.setattr(threads, "WORTH_COMPILING_MEASURE", 4)
+    monkeypatch.setattr(threads, "_interpreted_around", Counter())
+    monkeypatch.setattr(threads, "is_drawing_kept", lambda: kept)
+    monkeypatch.setattr(threads, "is_measure_kept", lambda form: kept)
+    job = threads.job_of(SimConfig(), HYBRID, {"extract": create("feature-set", "chitta").extract})
+    results = []
+    for n, are_compiled in ((2, kept), (2, True)):
+        batch = threads._Batch(job, ["none"] * n, range(n), 1, None)
+        results.append([grasp.extracted for grasp in batch.grasps(None)])
+        assert (batch.measure is not None, batch.drawing is not draw_numbers) == (are_compiled, are_compiled)
+    assert results[0] == results[1]
+
+
 def test_room_is_made_on_the_way_without_beginning_again(monkeypatch):
     whole = many(["toy"], [3])[0]
     assert whole.model.chosen.steps.macro_tolerance > 0.0
@@ -451,6 +490,20 @@ def test_room_is_made_on_the_way_without_beginning_again(monkeypatch):
         parts = many(["toy"], [3])[0]
         assert bits(parts.trace) == bits(whole.trace)
         assert parts.state == whole.state
+
+
+@pytest.mark.slow
+def test_traces_are_kept_only_where_they_are_asked_for():
+    backend = SimBackend(SimConfig(sensor="ideal"))
+    run = RunConfig(grasp_timeout_s=0.5, opening_timeout_s=0.1)
+    tracemalloc.start()
+    done = backend.run_many(HYBRID, ["none"] * 40, range(40), run=run, extract=len)
+    kept, _ = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert {grasp.trace for grasp in done} == {None}
+    assert all(grasp.extracted > 400 for grasp in done)
+    # Forty traces of half a second would be 2 MB.
+    assert kept < 1e6
 
 
 @every_case(
