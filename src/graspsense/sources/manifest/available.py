@@ -56,7 +56,7 @@ class AvailableColumns(dict[str, Any]):
         return next((part for part in parts if self.has(part)), next(iter(parts), None))
 
     def unit(self, expression: Expression, quantity: str) -> str:
-        """Return the unit behind an expression, or the one that the file states for a column on its own.
+        """Return the unit behind an expression, or the one that the file states for its columns.
 
         A mass stands for no unit: it is doubtful which force is meant. Times since 1970 tell their unit themselves.
         """
@@ -72,8 +72,14 @@ class AvailableColumns(dict[str, Any]):
         return unit_since_1970(float(expression.numbers(self, len(self.table))[0]))
 
     def stated(self, expression: Expression) -> str:
-        """Return the unit that the file states for an expression that is a column, empty if there is none."""
-        return self.table.units.get(expression.column, "")
+        """Return the unit that the file states for an expression that keeps it, empty if there is none."""
+        units = self.units_of(expression)
+        return units[0] if len(units) == 1 and expression.keeps_unit else ""
+
+    def units_of(self, expression: Expression) -> tuple[str, ...]:
+        """Return the different units that the file states for the columns of an expression, if these exist."""
+        names = expression.columns(tuple(self)) if self.has(expression) else ()
+        return tuple(dict.fromkeys(unit for name in names if (unit := self.table.units.get(name, ""))))
 
     def has(self, expression: Expression) -> bool:
         """Return whether all columns of an expression exist."""

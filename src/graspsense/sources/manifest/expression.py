@@ -74,6 +74,19 @@ class Expression:
         return _name_in(self.tree) if isinstance(self.tree, ast.Name | ast.Constant) else ""
 
     @property
+    def keeps_unit(self) -> bool:
+        """Whether its value has the unit of its columns: it neither multiplies nor divides, and takes no root."""
+        others = (ast.Mult, ast.Div)
+        nodes = list(ast.walk(self.tree))
+        return not any(isinstance(node, others) or getattr(node, "id", "") == "sqrt" for node in nodes)
+
+    @property
+    def factors(self) -> tuple[float, ...]:
+        """The numbers in it."""
+        values = (node.value for node in ast.walk(self.tree) if isinstance(node, ast.Constant))
+        return tuple(float(value) for value in values if isinstance(value, int | float))
+
+    @property
     def names(self) -> frozenset[str]:
         """The names and patterns of columns in it."""
         return frozenset(map(_name_in, _names(self.tree)))

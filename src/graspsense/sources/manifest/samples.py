@@ -34,6 +34,8 @@ EARLIEST_STAMP_S: Final = 1e6
 """A first time beyond this is a stamp of a clock, and times are counted from it."""
 MOSTLY: Final = 0.5
 """Share of the samples with gap and force from which on these were measured together."""
+EXACT: Final = 0.002
+"""Logarithm by which a factor in an expression is that of a unit."""
 QUANTITIES: Final = ("time", "gap", "force")
 """The quantities whose units are not those of another one."""
 
@@ -184,19 +186,34 @@ def _doubtful_units(columns: AvailableColumns) -> Iterator[str]:
         if chosen.unit and stated not in WITHOUT_UNIT and said != written:
             yield f"{key}: the manifest says [{chosen.unit}], and the file states {stated}"
         elif not columns.unit(chosen, quantity):
-            yield from _not_read(key, chosen, stated, quantity)
+            yield from _not_read(key, chosen, columns, quantity)
 
 
-def _not_read(key: str, chosen: Expression, stated: str, quantity: str) -> Iterator[str]:
-    """Yield that a column is read in the SI unit, although its file or its name states another one."""
-    si, named = next(iter(TO_SI[quantity])), unit_in_name(chosen.column, quantity)
-    if stated not in WITHOUT_UNIT:
-        yield f"{key}: the file states {stated}, and it is read in {si}: multiply it by a factor if it has to be"
-    elif named not in ("", si, "counts"):
-        yield (
-            f"{key}: it is read in {si}: if it is in {named}, as its name says, write "
-            f'{key} = "{chosen.text} [{named}]"'
-        )
+def _not_read(key: str, chosen: Expression, columns: AvailableColumns, quantity: str) -> Iterator[str]:
+    """Yield that numbers are read in the SI unit, although their file or their names state another one.
+
+    A factor that converts to it, at any power of ten, tells that they are in it.
+    """
+    si = next(iter(TO_SI[quantity]))
+    of_names = {unit_in_name(name, quantity): name for name in chosen.columns(tuple(columns))}
+    stated = [unit for unit in columns.units_of(chosen) if unit not in (*WITHOUT_UNIT, si)]
+    named = [unit for unit in of_names if unit not in ("", si, "counts")]
+    for unit in (*stated, *named):
+        if not any(_converts(factor, TO_SI[quantity].get(unit, 0.0)) for factor in chosen.factors):
+            said = f"the file states {unit}" if stated else f"the name of {of_names[unit]} says {unit}"
+            yield (
+                f"{key}: {said}, and it is read in {si}: if it is in {unit}, write its unit behind it, "
+                f'{key} = "{chosen.text} [{unit}]", or else [{si}]'
+            )
+            return
+
+
+def _converts(factor: float, to_si: float) -> bool:
+    """Return whether a number is the factor of a unit to the SI unit, or its inverse, at any power of ten."""
+    if not factor or not to_si:
+        return False
+    apart = (math.log10(abs(factor)) + sign * math.log10(to_si) for sign in (1.0, -1.0))
+    return any(abs(power - round(power)) < EXACT for power in apart)
 
 
 def _counted_time(columns: AvailableColumns) -> Iterator[str]:
