@@ -385,7 +385,7 @@ def test_a_unit_in_other_words_is_used_and_another_one_is_kept(lines, keys, gap_
     ("header", "units", "keys", "says"),
     [
         # A name that ends in another unit.
-        ("t,pos,f1_mN,f2", "", 'force = "f1_mN"', r"\[mN\].*its name says|its name says.*\[mN\]"),
+        ("t,pos,f1_mN,f2", "", 'force = "f1_mN"', r"f1_mN says.*\[mN\]"),
         ("t,pos,f1_kN,f2", "s,mm,N,", 'force = "f1_kN"', None),
         ("t,pos,f1_mN,f2", "s,mm,kgf,", 'force = "f1_mN"', None),
         ("t,pos,f1_N,f2", "", 'force = "f1_N"', None),
@@ -404,7 +404,7 @@ def test_a_unit_that_the_name_or_the_file_states_otherwise_is_told(tmp_path, hea
     text = f'files = "{{label}}.csv"\ntime = "t"\ngap = "{gap}"\n{keys}\n'
     (recording,) = recordings(tmp_path, lines, text)
     assert recording.recording.readings[0].frame.gap_m == pytest.approx(0.08)
-    told = [notice for notice in recording.notices if re.search(says or "its name says", notice)]
+    told = [notice for notice in recording.notices if re.search(says or "the name of", notice)]
     assert bool(told) == bool(says)
 
 

@@ -10,6 +10,7 @@ import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property, partial
+from itertools import pairwise
 from pathlib import Path, PurePosixPath
 from typing import Any, Final
 
@@ -90,19 +91,26 @@ class Folder:
         return dict(zip(map(int, table.numbers["task_index"]), texts, strict=True))
 
     def episodes(self) -> Iterator[Episode | UnreadableRecording]:
-        """Yield every episode, in order, and of one that cannot be read the reason. Raises DataDamaged."""
-        rows = sorted(self._episode_rows(), key=lambda row: _whole(row, "episode_index", "meta/episodes"))
-        claimed = self.info.get("total_episodes")
+        """Yield every episode, in order, and of what is missing or cannot be read the reason. Raises DataDamaged."""
+        rows = {_whole(row, "episode_index", "meta/episodes"): row for row in self._episode_rows()}
         if not rows:
             raise DataDamaged(f"{self.place}: no episode is described in meta/episodes")
-        if isinstance(claimed, int) and claimed != len(rows):
-            raise DataDamaged(
-                f"{self.place}: {INFO} says {claimed} episodes, and meta/episodes describes {len(rows)}"
-            )
+        frames = sum(_whole(row, "length", "meta/episodes") for row in rows.values())
+        told = [
+            f"{INFO} says {claimed} {what}, and meta/episodes describes {described}"
+            for what, described in (("episodes", len(rows)), ("frames", frames))
+            if isinstance(claimed := self.info.get(f"total_{what}"), int) and claimed != described
+        ]
+        told += [
+            f"meta/episodes goes from episode {earlier} to {later}"
+            for earlier, later in pairwise((-1, *sorted(rows)))
+            if later != earlier + 1
+        ]
+        for text in told:
+            yield UnreadableRecording(source=INFO, error=DataDamaged(f"{self.place}: {text}"))
         held: dict[str, ColumnTable | GraspsenseError] = {}
-        for row in rows:
-            name = f"episode {_whole(row, 'episode_index', 'meta/episodes')}"
-            yield from each_readable(name, partial(self._read_episode, row, held))
+        for index, row in sorted(rows.items()):
+            yield from each_readable(f"episode {index}", partial(self._read_episode, row, held))
 
     def _read_episode(
         self, row: Mapping[str, Any], held: dict[str, ColumnTable | GraspsenseError]

@@ -29,7 +29,6 @@ from graspsense.core.values.written_times import seconds_since_first
 from graspsense.sources.formats.patterns import regular_expression
 from graspsense.sources.formats.table import ColumnTable, Numbers
 from graspsense.sources.formats.text_table import (
-    UNITS,
     Line,
     TextTable,
     distinct_names,
@@ -37,6 +36,7 @@ from graspsense.sources.formats.text_table import (
     read_lines,
     table_of,
 )
+from graspsense.sources.units import UNITS
 
 _Part = tuple[dict[str, str], Sequence[Line]]
 
