@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from functools import partial
 from typing import Final
 
@@ -172,12 +171,6 @@ def _doubtful_units(columns: AvailableColumns) -> Iterator[str]:
         if chosen is None or not columns.has(chosen):
             continue
         stated = columns.stated(chosen)
-        if quantity == "force" and (grams := _gram_force(chosen, stated, tuple(columns))):
-            yield (
-                f"{key}: the unit or the name of the column is that of a mass, as of a scale: for gram-force write "
-                f'{key} = "{chosen.text} [{grams}]"'
-            )
-            continue
         others = [what for what in QUANTITIES if what != quantity and known_unit(stated, what) in TO_SI[what]]
         if quantity in QUANTITIES and others and stated not in WITHOUT_UNIT:
             yield f"{key}: the file states {stated}, which is no unit of a {quantity}: is it another column?"
@@ -185,7 +178,7 @@ def _doubtful_units(columns: AvailableColumns) -> Iterator[str]:
         said, written = (known_unit(unit, quantity) or unit for unit in (stated, chosen.unit))
         if chosen.unit and stated not in WITHOUT_UNIT and said != written:
             yield f"{key}: the manifest says [{chosen.unit}], and the file states {stated}"
-        elif not columns.unit(chosen, quantity):
+        elif columns.unit(chosen, quantity).lower() in ("", *GRAM_FORCE):
             yield from _not_read(key, chosen, columns, quantity)
 
 
@@ -196,15 +189,19 @@ def _not_read(key: str, chosen: Expression, columns: AvailableColumns, quantity:
     """
     si = next(iter(TO_SI[quantity]))
     of_names = {unit_in_name(name, quantity): name for name in chosen.columns(tuple(columns))}
-    stated = [unit for unit in columns.units_of(chosen) if unit not in (*WITHOUT_UNIT, si)]
-    named = [unit for unit in of_names if unit not in ("", si, "counts")]
-    for unit in (*stated, *named):
-        if not any(_converts(factor, TO_SI[quantity].get(unit, 0.0)) for factor in chosen.factors):
-            said = f"the file states {unit}" if stated else f"the name of {of_names[unit]} says {unit}"
-            yield (
-                f"{key}: {said}, and it is read in {si}: if it is in {unit}, write its unit behind it, "
-                f'{key} = "{chosen.text} [{unit}]", or else [{si}]'
+    stated = (chosen.unit,) if chosen.unit else columns.units_of(chosen)
+    for unit in stated or of_names:
+        meant = GRAM_FORCE.get(unit.lower(), unit) if quantity == "force" else unit
+        converted = any(_converts(factor, TO_SI[quantity].get(meant, 0.0)) for factor in chosen.factors)
+        if unit not in (*WITHOUT_UNIT, si, "counts") and not converted:
+            said = "the file states" if stated else f"the name of {of_names[unit]} says"
+            known = meant in TO_SI[quantity]
+            mended = (
+                f'if it is in {meant}, write {key} = "{chosen.text} [{meant}]"'
+                if known
+                else "multiply it by a factor"
             )
+            yield f"{key}: {said} {unit}, and it is read in {chosen.unit or si}: {mended}"
             return
 
 
@@ -227,15 +224,6 @@ def _counted_time(columns: AvailableColumns) -> Iterator[str]:
             "the time rises by 1 in each sample, as the number of a sample does: leave time out and write rate_hz, or "
             f'write time = "{chosen.text} [s]" if these are seconds'
         )
-
-
-def _gram_force(expression: Expression, stated: str, known: Sequence[str]) -> str:
-    """Return the unit of force that a scale means, where the unit or a name says that it is one; else an empty text."""
-    said = (expression.unit or stated).lower()
-    if said:
-        return GRAM_FORCE.get(said, "")
-    names = " ".join(expression.columns(known)).lower()
-    return next((GRAM_FORCE[word] for word in re.findall("[a-z]+", names) if word in GRAM_FORCE), "")
 
 
 def _folds(manifest: ReadManifest) -> list[str]:
