@@ -7,7 +7,7 @@ Ranges are without glitches. The noise of a force is its usual second difference
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from functools import cached_property
 from itertools import pairwise
 from typing import Final
@@ -71,8 +71,6 @@ SELDOM_ROWS: Final = 5
 KNOTS: Final = 6
 FINE_SHARE: Final = 2e-4
 """Fewest values at a steady rate with straight lines between them, in smaller steps than this share of their range."""
-DOUBLED: Final = 6
-"""Fewest samples with changing forces that are no chance if they come again."""
 LINE: Final = 10
 """Fewest samples of a straight line that is no chance in noise,"""
 FINE: Final = 5.0
@@ -154,7 +152,6 @@ def signal_notices(recording: Recording) -> Iterator[str]:
         yield from told
         return
     mean = evolve(forces[0], what="the force", n=np.mean([force.n for force in forces], axis=0))
-    told += _doubled(forces)
     hand = any(isinstance(channel, FingerForce) for channel in recording.channels)
     if not told and len(forces) > 1:
         told += [text for pair in (forces, forces[::-1]) for text in _numb(*pair)]
@@ -233,28 +230,6 @@ def _filled(signal: _Force) -> Iterator[str]:
             yield (
                 f"{signal.what} is a straight line from {signal.t[begin]:.4g} to {signal.when(end)}, although it has "
                 "noise: were missing samples filled in? A contact or a rest in this time is not known"
-            )
-            return
-
-
-def _doubled(forces: Sequence[_Force]) -> Iterator[str]:
-    """Yield that several samples with changing forces come again, as where a logger wrote a block twice."""
-    # Forces and a gap that were measured are never the same sum in so many samples.
-    sums = np.sum([0.7 * force.gap + (k + 0.3) * force.n for k, force in enumerate(forces)], axis=0)
-    order = np.argsort(sums, kind="stable")
-    same = np.flatnonzero(np.diff(sums[order]) == 0.0)
-    later = np.zeros(len(sums))
-    later[order[same + 1]] = order[same + 1] - order[same]
-    for begin, end in _runs(later) if len(same) >= DOUBLED else ():
-        earlier = begin - int(later[begin])
-        if (
-            end - begin >= DOUBLED
-            and earlier < begin
-            and all(np.diff(force.n[begin:end]).all() for force in forces)
-        ):
-            yield (
-                f"the samples from {forces[0].t[begin]:.4g} to {forces[0].when(end - 1)} are those from "
-                f"{forces[0].when(earlier)} on once more: were they written twice? Then leave them out"
             )
             return
 

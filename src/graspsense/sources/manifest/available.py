@@ -73,13 +73,9 @@ class AvailableColumns(dict[str, Any]):
 
     def stated(self, expression: Expression) -> str:
         """Return the unit that the file states for an expression that keeps it, empty if there is none."""
-        units = self.units_of(expression)
-        return units[0] if len(units) == 1 and expression.keeps_unit else ""
-
-    def units_of(self, expression: Expression) -> tuple[str, ...]:
-        """Return the different units that the file states for the columns of an expression, if these exist."""
-        names = expression.columns(tuple(self)) if self.has(expression) else ()
-        return tuple(dict.fromkeys(unit for name in names if (unit := self.table.units.get(name, ""))))
+        names = expression.columns(tuple(self)) if expression.keeps_unit and self.has(expression) else ()
+        units = {self.table.units.get(name, "") for name in names} - {""}
+        return units.pop() if len(units) == 1 else ""
 
     def has(self, expression: Expression) -> bool:
         """Return whether all columns of an expression exist."""

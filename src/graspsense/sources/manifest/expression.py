@@ -76,15 +76,10 @@ class Expression:
     @property
     def keeps_unit(self) -> bool:
         """Whether its value has the unit of its columns: it neither multiplies nor divides, and takes no root."""
-        others = (ast.Mult, ast.Div)
-        nodes = list(ast.walk(self.tree))
-        return not any(isinstance(node, others) or getattr(node, "id", "") == "sqrt" for node in nodes)
-
-    @property
-    def factors(self) -> tuple[float, ...]:
-        """The numbers in it."""
-        values = (node.value for node in ast.walk(self.tree) if isinstance(node, ast.Constant))
-        return tuple(float(value) for value in values if isinstance(value, int | float))
+        nodes = ast.walk(self.tree)
+        return not any(
+            isinstance(node, ast.Mult | ast.Div) or getattr(node, "id", "") == "sqrt" for node in nodes
+        )
 
     @property
     def names(self) -> frozenset[str]:

@@ -33,8 +33,6 @@ EARLIEST_STAMP_S: Final = 1e6
 """A first time beyond this is a stamp of a clock, and times are counted from it."""
 MOSTLY: Final = 0.5
 """Share of the samples with gap and force from which on these were measured together."""
-EXACT: Final = 0.002
-"""Logarithm by which a factor in an expression is that of a unit."""
 QUANTITIES: Final = ("time", "gap", "force")
 """The quantities whose units are not those of another one."""
 
@@ -183,17 +181,13 @@ def _doubtful_units(columns: AvailableColumns) -> Iterator[str]:
 
 
 def _not_read(key: str, chosen: Expression, columns: AvailableColumns, quantity: str) -> Iterator[str]:
-    """Yield that numbers are read in the SI unit, although their file or their names state another one.
-
-    A factor that converts to it, at any power of ten, tells that they are in it.
-    """
-    si = next(iter(TO_SI[quantity]))
-    of_names = {unit_in_name(name, quantity): name for name in chosen.columns(tuple(columns))}
-    stated = (chosen.unit,) if chosen.unit else columns.units_of(chosen)
-    for unit in stated or of_names:
+    """Yield that numbers are read in the SI unit, although their file or their names state another one."""
+    si, stated = next(iter(TO_SI[quantity])), chosen.unit or columns.stated(chosen)
+    names = chosen.columns(tuple(columns)) if chosen.keeps_unit and not stated else ()
+    of_names = {unit_in_name(name, quantity): name for name in names}
+    for unit in (stated, *of_names):
         meant = GRAM_FORCE.get(unit.lower(), unit) if quantity == "force" else unit
-        converted = any(_converts(factor, TO_SI[quantity].get(meant, 0.0)) for factor in chosen.factors)
-        if unit not in (*WITHOUT_UNIT, si, "counts") and not converted:
+        if unit not in (*WITHOUT_UNIT, si, "counts"):
             said = "the file states" if stated else f"the name of {of_names[unit]} says"
             known = meant in TO_SI[quantity]
             mended = (
@@ -203,14 +197,6 @@ def _not_read(key: str, chosen: Expression, columns: AvailableColumns, quantity:
             )
             yield f"{key}: {said} {unit}, and it is read in {chosen.unit or si}: {mended}"
             return
-
-
-def _converts(factor: float, to_si: float) -> bool:
-    """Return whether a number is the factor of a unit to the SI unit, or its inverse, at any power of ten."""
-    if not factor or not to_si:
-        return False
-    apart = (math.log10(abs(factor)) + sign * math.log10(to_si) for sign in (1.0, -1.0))
-    return any(abs(power - round(power)) < EXACT for power in apart)
 
 
 def _counted_time(columns: AvailableColumns) -> Iterator[str]:
