@@ -16,7 +16,7 @@ from graspsense.recording.readable import each_readable, error_of_all
 from graspsense.sources.columns.recording_notices import with_notices
 from graspsense.sources.formats.raw_tables import TEXT_SUFFIXES
 from graspsense.sources.formats.text_table import text_suffix
-from graspsense.sources.manifest.alike import compared_by_label
+from graspsense.sources.manifest.alike import compared
 from graspsense.sources.recordings.dataset_recordings import (
     datasets_with_recordings,
     is_recording_number,
@@ -70,7 +70,7 @@ def recordings_to_import(
                 good.append(recording)
     if bad and not good:
         raise error_of_all(bad)
-    told = compared_by_label([recording.labelled for recording in good])
+    told = compared([recording.labelled for recording in good], of_file=False)
     return [evolve(each, labelled=labelled) for each, labelled in zip(good, told, strict=True)], bad
 
 

@@ -7,7 +7,7 @@ force each pad bears, and the force at a gap that all reach. Nothing in a single
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -15,13 +15,14 @@ from attrs import evolve
 from numpy.typing import NDArray
 
 from graspsense.core.values.signals import NO_GAP
-from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
+from graspsense.recording.labelled_recording import LabelledRecording
 from graspsense.sources.columns.channel_facts import usual_range
 from graspsense.sources.columns.recording_notices import FEWEST, FREE, ZERO_SAMPLES, shares_under_load
 from graspsense.sources.formats.table import Numbers
 
 GRASPS: Final = 4
-"""Fewest grasps of a file that are compared."""
+GRASPS_OF_OBJECT: Final = 6
+"""Fewest grasps of a file that are compared, and of an object, which lies between the fingers in different ways."""
 MOST_COMPARED: Final = 100
 """Most grasps of a file that are compared with each other, and in memory at once."""
 APART: Final = 4.0
@@ -34,81 +35,52 @@ EXCHANGED: Final = 0.03
 """Least difference of shares that are those of exchanged pads,"""
 ALIKE: Final = 0.3
 """and share of a difference by which two that belong together differ at most."""
-SHARES: Final = "the right pad bears another share of the force"
 
 
-def compared(
-    recordings: Sequence[LabelledRecording | UnreadableRecording],
-) -> Iterator[LabelledRecording | UnreadableRecording]:
-    """Yield the recordings of a file in their order; one that is unlike most others has a notice of it."""
-    known = _long_enough(recordings)
-    told = _notices([*known.values()]) if len(known) >= GRASPS else [[]] * len(known)
-    yield from _noticed(recordings, dict(zip(known, told, strict=True)))
+def compared(recordings: Sequence[Any], *, of_file: bool) -> list[Any]:
+    """Return the recordings of a file, or of a data set, in their order; one unlike most others has a notice of it.
 
-
-def compared_by_label(recordings: Sequence[LabelledRecording]) -> list[LabelledRecording]:
-    """Return the recordings of a data set; one that is unlike most others of the same object has a notice of it.
-
-    They can be from different files, which may have other rates, and begin with other gaps.
+    Those of a data set are compared with those of the same object. Their files can have other rates, and begin with
+    other gaps.
     """
     groups: dict[Any, list[int]] = {}
-    for k, grasp in _long_enough(recordings).items():
-        units = tuple(sorted(grasp.recording.units.items()))
-        groups.setdefault((grasp.label, grasp.instance, units), []).append(k)
-    told: dict[int, list[str]] = {}
+    for k, grasp in enumerate(recordings):
+        if isinstance(grasp, LabelledRecording) and len(grasp.recording.readings) >= FEWEST:
+            units = tuple(sorted(grasp.recording.units.items()))
+            groups.setdefault(None if of_file else (grasp.label, grasp.instance, units), []).append(k)
+    noticed = [*recordings]
     for group in groups.values():
-        grasps = [recordings[k] for k in group]
-        if len(grasps) >= GRASPS:
-            unlike = {SHARES: _other_shares(_signals(grasps))}
-            told |= zip(group, _told(unlike, "of the same label"), strict=True)
-    return list(_noticed(recordings, told))
+        if len(group) >= (GRASPS if of_file else GRASPS_OF_OBJECT):
+            told = _notices([recordings[k] for k in group], of_file=of_file)
+            for k, texts in zip(group, told, strict=True):
+                noticed[k] = evolve(
+                    recordings[k], notices=tuple(dict.fromkeys((*recordings[k].notices, *texts)))
+                )
+    return noticed
 
 
-def _long_enough(
-    recordings: Sequence[LabelledRecording | UnreadableRecording],
-) -> dict[int, LabelledRecording]:
-    return {
-        k: recording
-        for k, recording in enumerate(recordings)
-        if isinstance(recording, LabelledRecording) and len(recording.recording.readings) >= FEWEST
-    }
-
-
-def _noticed(recordings: Sequence[Any], told: Mapping[int, list[str]]) -> Iterator[Any]:
-    for k, recording in enumerate(recordings):
-        new = [text for text in told.get(k, ()) if text not in recording.notices]
-        yield evolve(recording, notices=(*recording.notices, *new)) if new else recording
-
-
-def _signals(grasps: Sequence[LabelledRecording]) -> list[Numbers]:
-    return [grasp.recording.columns("gap_m", "force_left_n", "force_right_n") for grasp in grasps]
-
-
-def _told(unlike: Mapping[str, NDArray[np.bool_]], others: str) -> list[list[str]]:
-    """Return the notices of each grasp, from those in which something is `unlike` in `others`."""
-    ends = (
-        f"than in most grasps {others}: did a zero, a gain or the clock change, were the pads exchanged, or is it "
-        "another object?"
-    )
-    each = zip(*unlike.values(), strict=True)
-    return [[f"{what} {ends}" for what, other in zip(unlike, told, strict=True) if other] for told in each]
-
-
-def _notices(grasps: Sequence[LabelledRecording]) -> list[list[str]]:
-    """Return the notices of each grasp of a file."""
-    signals = _signals(grasps)
-    periods = [float(np.median(np.diff(grasp.recording.columns("t_s")[0]))) for grasp in grasps]
-    unlike = {
-        "the samples are further apart in time, or closer,": _apart(np.log(periods), math.log(RATIO)),
-        SHARES: _other_shares(signals),
-    }
-    if not any(grasp.recording.units.get("gap") == NO_GAP for grasp in grasps):
+def _notices(grasps: Sequence[LabelledRecording], *, of_file: bool) -> list[list[str]]:
+    """Return the notices of each grasp."""
+    signals = [grasp.recording.columns("gap_m", "force_left_n", "force_right_n") for grasp in grasps]
+    unlike = {"the right pad bears another share of the force": _other_shares(signals)}
+    if of_file:
+        periods = [float(np.median(np.diff(grasp.recording.columns("t_s")[0]))) for grasp in grasps]
+        unlike["the samples are further apart in time, or closer,"] = _apart(np.log(periods), math.log(RATIO))
+    if of_file and not any(grasp.recording.units.get("gap") == NO_GAP for grasp in grasps):
         low, high = np.array([usual_range(gap) for gap, *_ in signals]).T
         unlike["the fingers open to another gap"] = _apart(high, OPENING * float(np.median(high - low)))
         if len({grasp.label for grasp in grasps}) == 1:
             forces = [_force_at(signal, float(low.max())) for signal in signals]
             unlike["the force is another one at the same gap"] = _apart(np.log(forces), math.log(RATIO))
-    return _told(unlike, "of the file")
+    return [
+        [
+            f"{what} than in most grasps beside it: did a zero, a gain or the clock change, were the pads exchanged, "
+            "or is it another object?"
+            for what, which in unlike.items()
+            if which[k]
+        ]
+        for k in range(len(grasps))
+    ]
 
 
 def _other_shares(signals: Sequence[Numbers]) -> NDArray[np.bool_]:
