@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from functools import cached_property, partial
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cached_property, lru_cache, partial
 from itertools import pairwise
 from pathlib import Path, PurePosixPath
 from typing import Any, Final
@@ -17,7 +17,7 @@ from typing import Any, Final
 import numpy as np
 from attrs import frozen
 
-from graspsense.gripper_api import ColumnTable, GraspsenseError, TooLarge, read_parquet
+from graspsense.gripper_api import ColumnTable, TooLarge, read_parquet
 from graspsense.plugin_api import (
     ConfigError,
     DataDamaged,
@@ -108,25 +108,16 @@ class Folder:
         ]
         for text in told:
             yield UnreadableRecording(source=INFO, error=DataDamaged(f"{self.place}: {text}"))
-        held: dict[str, ColumnTable | GraspsenseError] = {}
+        table_of = lru_cache(maxsize=1)(
+            partial(self.parquet, wanted=self._wanted)
+        )  # a file has many episodes
         for index, row in sorted(rows.items()):
-            yield from each_readable(f"episode {index}", partial(self._read_episode, row, held))
+            yield from each_readable(f"episode {index}", partial(self._read_episode, row, table_of))
 
-    def _read_episode(
-        self, row: Mapping[str, Any], held: dict[str, ColumnTable | GraspsenseError]
-    ) -> tuple[Episode]:
-        """Return an episode; `held` is what the data file that was read last gave."""
+    def _read_episode(self, row: Mapping[str, Any], table_of: Callable[[str], ColumnTable]) -> tuple[Episode]:
+        """Return an episode, from what `table_of` gives for its data file."""
         path = self._filled("data_path", self._numbers(row, "data/"))
-        if path not in held:
-            held.clear()
-            try:
-                held[path] = self.parquet(path, self._wanted)
-            except GraspsenseError as error:
-                held[path] = error
-        table = held[path]
-        if isinstance(table, GraspsenseError):
-            raise table
-        return (self._episode(row, path, table),)
+        return (self._episode(row, path, table_of(path)),)
 
     def parquet(self, path: str, wanted: Sequence[str] | None = None) -> ColumnTable:
         """Return these columns of a Parquet file of the folder, or all. Raises DataDamaged, TooLarge."""

@@ -31,10 +31,6 @@ OPENING: Final = 0.05
 SHARE: Final = 0.06
 RATIO: Final = 1.4
 """and by this share of the range of the gap, this share of the force of both pads, or this ratio of forces or times."""
-EXCHANGED: Final = 0.03
-"""Least difference of shares that are those of exchanged pads,"""
-ALIKE: Final = 0.3
-"""and share of a difference by which two that belong together differ at most."""
 
 
 def compared(recordings: Sequence[Any], *, of_file: bool) -> list[Any]:
@@ -53,16 +49,20 @@ def compared(recordings: Sequence[Any], *, of_file: bool) -> list[Any]:
         if len(group) >= (GRASPS if of_file else GRASPS_OF_OBJECT):
             told = _notices([recordings[k] for k in group], of_file=of_file)
             for k, texts in zip(group, told, strict=True):
-                noticed[k] = evolve(
-                    recordings[k], notices=tuple(dict.fromkeys((*recordings[k].notices, *texts)))
-                )
+                if not texts:
+                    continue
+                notices = tuple(dict.fromkeys((*recordings[k].notices, *texts)))
+                recording = evolve(recordings[k].recording, notices=notices)
+                noticed[k] = evolve(recordings[k], notices=notices, recording=recording)
     return noticed
 
 
 def _notices(grasps: Sequence[LabelledRecording], *, of_file: bool) -> list[list[str]]:
     """Return the notices of each grasp."""
     signals = [grasp.recording.columns("gap_m", "force_left_n", "force_right_n") for grasp in grasps]
-    unlike = {"the right pad bears another share of the force": _other_shares(signals)}
+    loaded = [shares_under_load(left, right) for _, left, right in signals]
+    shares = [float(np.median(of_right)) if len(of_right) else math.nan for of_right in loaded]
+    unlike = {"the right pad bears another share of the force": _apart(shares, SHARE)}
     if of_file:
         periods = [float(np.median(np.diff(grasp.recording.columns("t_s")[0]))) for grasp in grasps]
         unlike["the samples are further apart in time, or closer,"] = _apart(np.log(periods), math.log(RATIO))
@@ -81,18 +81,6 @@ def _notices(grasps: Sequence[LabelledRecording], *, of_file: bool) -> list[list
         ]
         for k in range(len(grasps))
     ]
-
-
-def _other_shares(signals: Sequence[Numbers]) -> NDArray[np.bool_]:
-    """Return in which grasps the pads bear other shares of the force; also by less, if these are exchanged."""
-    loaded = [shares_under_load(left, right) for _, left, right in signals]
-    shares = np.array([float(np.median(of_right)) if len(of_right) else math.nan for of_right in loaded])
-    other, least = _apart(shares, SHARE), _apart(shares, EXCHANGED)
-    if other.any() or min(least.sum(), (~least).sum()) < 2:
-        return other
-    of_some, of_most = float(shares[least].mean()), float(shares[~least].mean())
-    exchanged = abs(of_some + of_most - 1.0) < ALIKE * abs(of_some - of_most)
-    return least & exchanged
 
 
 def _force_at(signal: Numbers, gap: float) -> float:
