@@ -108,9 +108,8 @@ class Folder:
         ]
         for text in told:
             yield UnreadableRecording(source=INFO, error=DataDamaged(f"{self.place}: {text}"))
-        table_of = lru_cache(maxsize=1)(
-            partial(self.parquet, wanted=self._wanted)
-        )  # a file has many episodes
+        # A file can have many episodes.
+        table_of = lru_cache(maxsize=1)(partial(self.parquet, wanted=self._wanted))
         for index, row in sorted(rows.items()):
             yield from each_readable(f"episode {index}", partial(self._read_episode, row, table_of))
 

@@ -236,13 +236,12 @@ def _apart(stamped: Mapping[str, Nanoseconds], recorded: Mapping[str, Nanosecond
 
 def _delays(topics: Mapping[str, Messages]) -> dict[str, int]:
     """Return the least delay from header to recording of each topic whose headers have times (ns)."""
-    every = {
-        topic: [
-            ns - stamp for ns, stamp in zip(messages.recorded_ns, messages.stamped_ns, strict=True) if stamp
-        ]
-        for topic, messages in topics.items()
-    }
-    return {topic: min(delays) for topic, delays in every.items() if delays}
+    delays = {}
+    for topic, messages in topics.items():
+        times = zip(messages.recorded_ns, messages.stamped_ns, strict=True)
+        if known := [recorded - stamped for recorded, stamped in times if stamped]:
+            delays[topic] = min(known)
+    return delays
 
 
 def _least_delays(recorded: Nanoseconds, stamped: Nanoseconds) -> list[int]:

@@ -21,8 +21,7 @@ from graspsense.sources.columns.recording_notices import FEWEST, FREE, ZERO_SAMP
 from graspsense.sources.formats.table import Numbers
 
 GRASPS: Final = 4
-GRASPS_OF_OBJECT: Final = 6
-"""Fewest grasps of a file that are compared, and of an object, which lies between the fingers in different ways."""
+"""Fewest grasps of a file, or of an object, that are compared."""
 MOST_COMPARED: Final = 100
 """Most grasps of a file that are compared with each other, and in memory at once."""
 APART: Final = 4.0
@@ -42,18 +41,14 @@ def compared(recordings: Sequence[Any], *, of_file: bool) -> list[Any]:
     groups: dict[Any, list[int]] = {}
     for k, grasp in enumerate(recordings):
         if isinstance(grasp, LabelledRecording) and len(grasp.recording.readings) >= FEWEST:
-            units = tuple(sorted(grasp.recording.units.items()))
-            groups.setdefault(None if of_file else (grasp.label, grasp.instance, units), []).append(k)
+            groups.setdefault(None if of_file else (grasp.label, grasp.instance), []).append(k)
     noticed = [*recordings]
     for group in groups.values():
-        if len(group) >= (GRASPS if of_file else GRASPS_OF_OBJECT):
+        if len(group) >= GRASPS:
             told = _notices([recordings[k] for k in group], of_file=of_file)
             for k, texts in zip(group, told, strict=True):
-                if not texts:
-                    continue
-                notices = tuple(dict.fromkeys((*recordings[k].notices, *texts)))
-                recording = evolve(recordings[k].recording, notices=notices)
-                noticed[k] = evolve(recordings[k], notices=notices, recording=recording)
+                notices = dict.fromkeys((*recordings[k].notices, *texts))
+                noticed[k] = evolve(recordings[k], notices=tuple(notices))
     return noticed
 
 

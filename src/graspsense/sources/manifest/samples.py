@@ -170,11 +170,10 @@ def _doubtful_units(columns: AvailableColumns) -> Iterator[str]:
             continue
         stated = columns.stated(chosen)
         others = [what for what in QUANTITIES if what != quantity and known_unit(stated, what) in TO_SI[what]]
+        said, written = (known_unit(unit, quantity) or unit for unit in (stated, chosen.unit))
         if quantity in QUANTITIES and others and stated not in WITHOUT_UNIT:
             yield f"{key}: the file states {stated}, which is no unit of a {quantity}: is it another column?"
-            continue
-        said, written = (known_unit(unit, quantity) or unit for unit in (stated, chosen.unit))
-        if chosen.unit and stated not in WITHOUT_UNIT and said != written:
+        elif chosen.unit and stated not in WITHOUT_UNIT and said != written:
             yield f"{key}: the manifest says [{chosen.unit}], and the file states {stated}"
         elif columns.unit(chosen, quantity).lower() in ("", *GRAM_FORCE):
             yield from _not_read(key, chosen, columns, quantity)
@@ -185,18 +184,13 @@ def _not_read(key: str, chosen: Expression, columns: AvailableColumns, quantity:
     si, stated = next(iter(TO_SI[quantity])), chosen.unit or columns.stated(chosen)
     names = chosen.columns(tuple(columns)) if chosen.keeps_unit and not stated else ()
     of_names = {unit_in_name(name, quantity): name for name in names}
-    for unit in (stated, *of_names):
+    unit = next((unit for unit in (stated, *of_names) if unit not in (*WITHOUT_UNIT, si, "counts")), "")
+    if unit:
         meant = GRAM_FORCE.get(unit.lower(), unit) if quantity == "force" else unit
-        if unit not in (*WITHOUT_UNIT, si, "counts"):
-            said = "the file states" if stated else f"the name of {of_names[unit]} says"
-            known = meant in TO_SI[quantity]
-            mended = (
-                f'if it is in {meant}, write {key} = "{chosen.text} [{meant}]"'
-                if known
-                else "multiply it by a factor"
-            )
-            yield f"{key}: {said} {unit}, and it is read in {chosen.unit or si}: {mended}"
-            return
+        said = "the file states" if stated else f"the name of {of_names[unit]} says"
+        known = f'if it is in {meant}, write {key} = "{chosen.text} [{meant}]"'
+        mended = known if meant in TO_SI[quantity] else "multiply it by a factor"
+        yield f"{key}: {said} {unit}, and it is read in {chosen.unit or si}: {mended}"
 
 
 def _counted_time(columns: AvailableColumns) -> Iterator[str]:

@@ -73,10 +73,8 @@ class IcubGrasp:
     @property
     def flexion_deg(self) -> Numbers:
         """The mean of two flexions in each frame: that of the thumb, and that of the index and middle finger."""
-        thumb, fingers = (
-            self.encoders_deg[:, [joint - FIRST_JOINT for joint in joints]].mean(axis=1)
-            for joints in (THUMB_FLEXION, FINGER_FLEXION)
-        )
+        every = (np.array(joints) - FIRST_JOINT for joints in (THUMB_FLEXION, FINGER_FLEXION))
+        thumb, fingers = (self.encoders_deg[:, joints].mean(axis=1) for joints in every)
         return (thumb + fingers) / 2.0
 
 

@@ -43,9 +43,8 @@ def labelled_recordings(
     rows: list[tuple[Features, Features]] = []
     read = list(readable_or_not(kind, place))
     unreadable = [recording for recording in read if isinstance(recording, UnreadableRecording)]
-    known = compared(
-        [recording for recording in read if isinstance(recording, LabelledRecording)], of_file=False
-    )
+    known = [recording for recording in read if isinstance(recording, LabelledRecording)]
+    known = compared(known, of_file=False)
     fitted, threshold_notes = _fitted(features, [recording.recording for recording in known])
     features = with_checkpoints(fitted, checkpoints_s)
     for recording in known:
