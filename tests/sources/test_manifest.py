@@ -7,8 +7,8 @@ from textwrap import dedent
 
 import numpy as np
 import pytest
-from attrs import evolve
 import scipy
+from attrs import evolve
 from cases import every_case
 from commands import answered, graspsense, printed, refused
 from recorded_files import write_topics
