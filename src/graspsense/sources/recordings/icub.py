@@ -75,7 +75,8 @@ class IcubGrasp:
         """The mean of two flexions in each frame: that of the thumb, and that of the index and middle finger."""
         every = (np.array(joints) - FIRST_JOINT for joints in (THUMB_FLEXION, FINGER_FLEXION))
         thumb, fingers = (self.encoders_deg[:, joints].mean(axis=1) for joints in every)
-        return (thumb + fingers) / 2.0
+        mean: Numbers = (thumb + fingers) / 2.0
+        return mean
 
 
 def read_recording(name: str) -> Recording:
