@@ -159,7 +159,7 @@ def test_units_and_the_force_are_those_of_the_numbers_and_their_names(tmp_path, 
 
 
 def test_missing_frames_are_told_and_divide_the_episode(tmp_path):
-    folder = write_set(tmp_path / "set", 3, [episode(2)])
+    folder = write_set(tmp_path / "set", 3, [episode(2)], total_frames=172)
     table = pq.read_table(folder / DATA)
     kept = [k for k in range(len(table)) if not 88 <= k < 96]
     pq.write_table(table.take(kept), folder / DATA)
@@ -315,11 +315,11 @@ DATA, META = "data/chunk-000/file-000.parquet", "meta/info.json"
         (_cut(DATA), DataDamaged, "file-000.parquet"),
         (_other_schema, DataDamaged, "timestamp"),
         (_ragged, DataDamaged, "observation.state"),
-        (_episodes(length=[1, 2, 3]), DataDamaged, "90 frames"),
-        (_episodes(**{"data/file_index": [7, 7, 7]}), DataDamaged, "file-007.parquet is missing"),
+        (_episodes(length=[89, 181, 90]), DataDamaged, "90 frames"),
         (_episodes(**{"data/file_index": [-1, 0, 0]}), DataDamaged, "file_index"),
-        (_episodes(episode_index=[0, 1, 9]), DataDamaged, "episode 9"),
+        (_episodes(episode_index=[0, 1, 9]), DataDamaged, "1 to 9"),
         (_info(total_episodes=4), DataDamaged, "4 episodes"),
+        (_info(total_frames=7), DataDamaged, "7 frames"),
         (_info(codebase_version="v1.6"), DataDamaged, "v1.6"),
         (_info(fps=0), DataDamaged, "fps"),
         (_info(fps="30"), DataDamaged, "fps"),

@@ -8,15 +8,16 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from functools import cached_property, partial
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cached_property, lru_cache, partial
+from itertools import pairwise
 from pathlib import Path, PurePosixPath
 from typing import Any, Final
 
 import numpy as np
 from attrs import frozen
 
-from graspsense.gripper_api import ColumnTable, GraspsenseError, TooLarge, read_parquet
+from graspsense.gripper_api import ColumnTable, TooLarge, read_parquet
 from graspsense.plugin_api import (
     ConfigError,
     DataDamaged,
@@ -90,35 +91,32 @@ class Folder:
         return dict(zip(map(int, table.numbers["task_index"]), texts, strict=True))
 
     def episodes(self) -> Iterator[Episode | UnreadableRecording]:
-        """Yield every episode, in order, and of one that cannot be read the reason. Raises DataDamaged."""
-        rows = sorted(self._episode_rows(), key=lambda row: _whole(row, "episode_index", "meta/episodes"))
-        claimed = self.info.get("total_episodes")
+        """Yield every episode, in order, and of what is missing or cannot be read the reason. Raises DataDamaged."""
+        rows = {_whole(row, "episode_index", "meta/episodes"): row for row in self._episode_rows()}
         if not rows:
             raise DataDamaged(f"{self.place}: no episode is described in meta/episodes")
-        if isinstance(claimed, int) and claimed != len(rows):
-            raise DataDamaged(
-                f"{self.place}: {INFO} says {claimed} episodes, and meta/episodes describes {len(rows)}"
-            )
-        held: dict[str, ColumnTable | GraspsenseError] = {}
-        for row in rows:
-            name = f"episode {_whole(row, 'episode_index', 'meta/episodes')}"
-            yield from each_readable(name, partial(self._read_episode, row, held))
+        frames = sum(_whole(row, "length", "meta/episodes") for row in rows.values())
+        told = [
+            f"{INFO} says {claimed} {what}, and meta/episodes describes {described}"
+            for what, described in (("episodes", len(rows)), ("frames", frames))
+            if isinstance(claimed := self.info.get(f"total_{what}"), int) and claimed != described
+        ]
+        told += [
+            f"meta/episodes goes from episode {earlier} to {later}"
+            for earlier, later in pairwise((-1, *sorted(rows)))
+            if later != earlier + 1
+        ]
+        for text in told:
+            yield UnreadableRecording(source=INFO, error=DataDamaged(f"{self.place}: {text}"))
+        # A file can have many episodes.
+        table_of = lru_cache(maxsize=1)(partial(self.parquet, wanted=self._wanted))
+        for index, row in sorted(rows.items()):
+            yield from each_readable(f"episode {index}", partial(self._read_episode, row, table_of))
 
-    def _read_episode(
-        self, row: Mapping[str, Any], held: dict[str, ColumnTable | GraspsenseError]
-    ) -> tuple[Episode]:
-        """Return an episode; `held` is what the data file that was read last gave."""
+    def _read_episode(self, row: Mapping[str, Any], table_of: Callable[[str], ColumnTable]) -> tuple[Episode]:
+        """Return an episode, from what `table_of` gives for its data file."""
         path = self._filled("data_path", self._numbers(row, "data/"))
-        if path not in held:
-            held.clear()
-            try:
-                held[path] = self.parquet(path, self._wanted)
-            except GraspsenseError as error:
-                held[path] = error
-        table = held[path]
-        if isinstance(table, GraspsenseError):
-            raise table
-        return (self._episode(row, path, table),)
+        return (self._episode(row, path, table_of(path)),)
 
     def parquet(self, path: str, wanted: Sequence[str] | None = None) -> ColumnTable:
         """Return these columns of a Parquet file of the folder, or all. Raises DataDamaged, TooLarge."""

@@ -23,18 +23,19 @@ TOUCHED: Final = 0.2
 """Share of the range of the force above which an object is touched, as for the squeezes of a manifest."""
 
 
+def _observations(episode: Episode) -> NDArray[np.float64]:
+    """Return the numbers of all observations, a row for each frame."""
+    named = episode.table.numbers.items()
+    return np.column_stack(
+        [values.reshape(len(values), -1) for key, values in named if key.startswith("obs")]
+    )
+
+
 def repeated_frames(understood: Understood, episode: Episode) -> NDArray[np.bool_]:
     """Return which frames are equal to the one before in all observations, or have its time."""
-    rows = np.column_stack(
-        [
-            values.reshape(len(values), -1)
-            for key, values in episode.table.numbers.items()
-            if key.startswith("obs")
-        ]
-    )
-    same = np.concatenate(([False], (rows[1:] == rows[:-1]).all(axis=1)))
-    times = times_of(understood, episode)
-    return same | np.concatenate(([False], np.diff(times) == 0.0))
+    rows, times = _observations(episode), times_of(understood, episode)
+    same: NDArray[np.bool_] = (rows[1:] == rows[:-1]).all(axis=1) | (np.diff(times) == 0.0)
+    return np.concatenate(([False], same))
 
 
 def notices_of(understood: Understood, episode: Episode) -> Iterator[str]:
@@ -70,8 +71,7 @@ def notices_of(understood: Understood, episode: Episode) -> Iterator[str]:
             f"{int(repeated.sum())} of {len(times)} frames repeat the one before, as of a sensor slower than the "
             "frames: ?repeated=drop leaves them out"
         )
-    missing = int(sum((~np.isfinite(values)).any(axis=-1).sum() if values.ndim > 1 else (~np.isfinite(values)).sum()
-                      for key, values in episode.table.numbers.items() if key.startswith("obs")))  # fmt: skip
+    missing = int((~np.isfinite(_observations(episode))).any(axis=1).sum())
     if missing:
         yield f"{missing} frames have an observation without a number: left out where gap or force is missing"
 

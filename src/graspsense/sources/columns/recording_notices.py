@@ -503,7 +503,9 @@ def _late(force: _Force, *, doubtful: bool) -> Iterator[str]:
         return
     begin, pressed, span = int(free[free < loaded[0]].max(initial=0)), int(loaded[0]), float(np.ptp(gap))
     end = int(free[free > pressed].min(initial=len(t)))
-    narrowest, step = float(gap[begin:end].min()), resolution(force.gap) or 0.0
+    # Behind its peak, a gap whose sensor stopped can go on to another value.
+    peak = begin + int(n[begin:end].argmax())
+    narrowest, step = float(gap[begin : peak + 1].min()), resolution(force.gap) or 0.0
     bends = np.abs(np.diff(force.gap, 2))
     # The steps of a coarse gap that moves are no noise.
     noise = NOISE * float(np.median(bends * (bends > BEND * step)))

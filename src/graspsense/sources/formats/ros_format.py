@@ -178,10 +178,7 @@ def _mcap_records(path: Path) -> Iterator[McapRecord]:
     unpacked = Unpacked(path)
     with path.open("rb") as file:
         for record in records_of(file, unpacked):
-            if isinstance(record, Chunk):
-                yield from records_in(record, unpacked)
-            else:
-                yield record
+            yield from records_in(record, unpacked) if isinstance(record, Chunk) else (record,)
 
 
 def numbers_in(value: Any, name: str) -> Iterator[tuple[str, Any]]:

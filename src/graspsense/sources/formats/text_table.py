@@ -32,6 +32,7 @@ from graspsense.core.values.written_numbers import (
 from graspsense.recording.readable import readable, refuse_devices
 from graspsense.recording.unpacked import Unpacked
 from graspsense.sources.formats.spreadsheet import spreadsheet_text
+from graspsense.sources.units import UNITS
 
 LONGEST_NAME: Final = 500
 """Limit on the characters of the name of a column."""
@@ -40,18 +41,7 @@ JSON_LINES: Final = (".jsonl", ".ndjson")
 GZIP: Final = ".gz"
 INDEX: Final = "index"
 """Name of a first column without a name."""
-UNITS: Final = frozenset((
-    "s", "sec", "secs", "seconds", "ms", "msec", "us", "\u00b5s", "\u03bcs", "ns", "min", "m", "cm", "mm",
-    "um", "\u00b5m", "\u03bcm", "in", "inch", "n", "mn", "kn", "g", "gram", "grams", "kg", "gf", "kgf", "lb",
-    "lbf", "lbs", "kp", "cn", "dan", "ozf", "n/m", "n/mm",
-    "v", "mv", "a", "ma", "hz", "khz", "c", "\u00b0c", "degc", "k", "deg", "\u00b0", "rad", "%", "-",
-    "1", "pa", "kpa", "mpa", "bar", "psi", "nm", "n\u00b7m", "n*m", "m/s", "cm/s", "mm/s", "m/s2", "m/s^2",
-    "millisecond", "milliseconds", "millimeter", "millimeters", "millimetre", "millimetres", "inches", "newton",
-    "newtons", "m/s\u00b2", "rad/s", "deg/s", "counts", "count", "raw", "adc", "a.u.", "au", "step", "steps",
-    "ml", "cl", "dl", "mj", "mw", "n/s", "n/cm", "mm/n", "n*mm", "nmm", "cm2", "mm2", "mm^2", "mm\u00b2", "rpm", "ohm",
-))  # fmt: skip
-"""What stands in a line of units, in small letters."""
-_SINGLE_UNITS: Final = frozenset("smgNVACK%\u00b0")
+_SINGLE_UNITS: Final = frozenset("smgNJWVACK%\u00b0")
 """Units of one sign behind a number: in the other case, or as `12-`, it can be a factor or a sign of its own."""
 _UNSEEN: Final = re.compile("[\u200b\u200e\u200f\u202a-\u202e\u2060\u2066-\u2069\ufeff]")
 """Marks that nothing shows: the order of bytes, also in the middle of files that were joined, and of writing."""

@@ -16,6 +16,7 @@ from graspsense.recording.readable import each_readable, error_of_all
 from graspsense.sources.columns.recording_notices import with_notices
 from graspsense.sources.formats.raw_tables import TEXT_SUFFIXES
 from graspsense.sources.formats.text_table import text_suffix
+from graspsense.sources.manifest.alike import compared
 from graspsense.sources.recordings.dataset_recordings import (
     datasets_with_recordings,
     is_recording_number,
@@ -69,7 +70,8 @@ def recordings_to_import(
                 good.append(recording)
     if bad and not good:
         raise error_of_all(bad)
-    return good, bad
+    told = compared([recording.labelled for recording in good], of_file=False)
+    return [evolve(each, labelled=labelled) for each, labelled in zip(good, told, strict=True)], bad
 
 
 def _named_by(

@@ -56,7 +56,7 @@ class AvailableColumns(dict[str, Any]):
         return next((part for part in parts if self.has(part)), next(iter(parts), None))
 
     def unit(self, expression: Expression, quantity: str) -> str:
-        """Return the unit behind an expression, or the one that the file states for a column on its own.
+        """Return the unit behind an expression, or the one that the file states for its columns.
 
         A mass stands for no unit: it is doubtful which force is meant. Times since 1970 tell their unit themselves.
         """
@@ -72,8 +72,10 @@ class AvailableColumns(dict[str, Any]):
         return unit_since_1970(float(expression.numbers(self, len(self.table))[0]))
 
     def stated(self, expression: Expression) -> str:
-        """Return the unit that the file states for an expression that is a column, empty if there is none."""
-        return self.table.units.get(expression.column, "")
+        """Return the unit that the file states for an expression that keeps it, empty if there is none."""
+        names = expression.columns(tuple(self)) if expression.keeps_unit and self.has(expression) else ()
+        units = {self.table.units.get(name, "") for name in names} - {""}
+        return units.pop() if len(units) == 1 else ""
 
     def has(self, expression: Expression) -> bool:
         """Return whether all columns of an expression exist."""

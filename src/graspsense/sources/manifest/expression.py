@@ -74,6 +74,14 @@ class Expression:
         return _name_in(self.tree) if isinstance(self.tree, ast.Name | ast.Constant) else ""
 
     @property
+    def keeps_unit(self) -> bool:
+        """Whether its value has the unit of its columns: it neither multiplies nor divides, and takes no root."""
+        nodes = ast.walk(self.tree)
+        return not any(
+            isinstance(node, ast.Mult | ast.Div) or getattr(node, "id", "") == "sqrt" for node in nodes
+        )
+
+    @property
     def names(self) -> frozenset[str]:
         """The names and patterns of columns in it."""
         return frozenset(map(_name_in, _names(self.tree)))

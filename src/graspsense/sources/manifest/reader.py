@@ -53,7 +53,7 @@ def read_recordings(place: str) -> Iterator[LabelledRecording | UnreadableRecord
     for file in files_of(manifest):
         grasps = _recordings_of(manifest, file, told)
         while together := list(islice(grasps, MOST_COMPARED)):
-            yield from compared(together)
+            yield from compared(together, of_file=True)
 
 
 def _recordings_of(

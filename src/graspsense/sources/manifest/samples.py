@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from functools import partial
 from typing import Final
 
@@ -170,33 +169,28 @@ def _doubtful_units(columns: AvailableColumns) -> Iterator[str]:
         if chosen is None or not columns.has(chosen):
             continue
         stated = columns.stated(chosen)
-        if quantity == "force" and (grams := _gram_force(chosen, stated, tuple(columns))):
-            yield (
-                f"{key}: the unit or the name of the column is that of a mass, as of a scale: for gram-force write "
-                f'{key} = "{chosen.text} [{grams}]"'
-            )
-            continue
         others = [what for what in QUANTITIES if what != quantity and known_unit(stated, what) in TO_SI[what]]
+        said, written = (known_unit(unit, quantity) or unit for unit in (stated, chosen.unit))
         if quantity in QUANTITIES and others and stated not in WITHOUT_UNIT:
             yield f"{key}: the file states {stated}, which is no unit of a {quantity}: is it another column?"
-            continue
-        said, written = (known_unit(unit, quantity) or unit for unit in (stated, chosen.unit))
-        if chosen.unit and stated not in WITHOUT_UNIT and said != written:
+        elif chosen.unit and stated not in WITHOUT_UNIT and said != written:
             yield f"{key}: the manifest says [{chosen.unit}], and the file states {stated}"
-        elif not columns.unit(chosen, quantity):
-            yield from _not_read(key, chosen, stated, quantity)
+        elif columns.unit(chosen, quantity).lower() in ("", *GRAM_FORCE):
+            yield from _not_read(key, chosen, columns, quantity)
 
 
-def _not_read(key: str, chosen: Expression, stated: str, quantity: str) -> Iterator[str]:
-    """Yield that a column is read in the SI unit, although its file or its name states another one."""
-    si, named = next(iter(TO_SI[quantity])), unit_in_name(chosen.column, quantity)
-    if stated not in WITHOUT_UNIT:
-        yield f"{key}: the file states {stated}, and it is read in {si}: multiply it by a factor if it has to be"
-    elif named not in ("", si, "counts"):
-        yield (
-            f"{key}: it is read in {si}: if it is in {named}, as its name says, write "
-            f'{key} = "{chosen.text} [{named}]"'
-        )
+def _not_read(key: str, chosen: Expression, columns: AvailableColumns, quantity: str) -> Iterator[str]:
+    """Yield that numbers are read in the SI unit, although their file or their names state another one."""
+    si, stated = next(iter(TO_SI[quantity])), chosen.unit or columns.stated(chosen)
+    names = chosen.columns(tuple(columns)) if chosen.keeps_unit and not stated else ()
+    of_names = {unit_in_name(name, quantity): name for name in names}
+    unit = next((unit for unit in (stated, *of_names) if unit not in (*WITHOUT_UNIT, si, "counts")), "")
+    if unit:
+        meant = GRAM_FORCE.get(unit.lower(), unit) if quantity == "force" else unit
+        said = "the file states" if stated else f"the name of {of_names[unit]} says"
+        known = f'if it is in {meant}, write {key} = "{chosen.text} [{meant}]"'
+        mended = known if meant in TO_SI[quantity] else "multiply it by a factor"
+        yield f"{key}: {said} {unit}, and it is read in {chosen.unit or si}: {mended}"
 
 
 def _counted_time(columns: AvailableColumns) -> Iterator[str]:
@@ -210,15 +204,6 @@ def _counted_time(columns: AvailableColumns) -> Iterator[str]:
             "the time rises by 1 in each sample, as the number of a sample does: leave time out and write rate_hz, or "
             f'write time = "{chosen.text} [s]" if these are seconds'
         )
-
-
-def _gram_force(expression: Expression, stated: str, known: Sequence[str]) -> str:
-    """Return the unit of force that a scale means, where the unit or a name says that it is one; else an empty text."""
-    said = (expression.unit or stated).lower()
-    if said:
-        return GRAM_FORCE.get(said, "")
-    names = " ".join(expression.columns(known)).lower()
-    return next((GRAM_FORCE[word] for word in re.findall("[a-z]+", names) if word in GRAM_FORCE), "")
 
 
 def _folds(manifest: ReadManifest) -> list[str]:

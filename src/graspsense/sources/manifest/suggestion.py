@@ -104,9 +104,8 @@ def _is_recording(path: Path) -> bool:
 
 
 def _ending(path: Path) -> str:
-    return (
-        "" if path.is_dir() else "".join(path.suffixes[-2:] if path.suffix == ".gz" else path.suffixes[-1:])
-    )
+    ending = path.suffixes[-2:] if path.suffix == ".gz" else path.suffixes[-1:]
+    return "" if path.is_dir() else "".join(ending)
 
 
 def _pattern(names: Sequence[str]) -> tuple[str, set[str], str]:
@@ -173,10 +172,8 @@ def _pieces(values: Sequence[str]) -> list[tuple[str, Sequence[str]]]:
 def _common_ending(values: Sequence[str]) -> str:
     """Return what all values end with, from a sign between words on."""
     shortest = min(values, key=len)
-    for k in range(1, len(shortest)):
-        if shortest[k] in "-_ " and all(value.endswith(shortest[k:]) for value in values):
-            return shortest[k:]
-    return ""
+    endings = (shortest[k:] for k in range(1, len(shortest)) if shortest[k] in "-_ ")
+    return next((end for end in endings if all(value.endswith(end) for value in values)), "")
 
 
 def _table_of(path: Path) -> tuple[ColumnTable, list[Guess]]:

@@ -70,6 +70,14 @@ class IcubGrasp:
         """Return the number of frames."""
         return len(self.encoders_deg)
 
+    @property
+    def flexion_deg(self) -> Numbers:
+        """The mean of two flexions in each frame: that of the thumb, and that of the index and middle finger."""
+        every = (np.array(joints) - FIRST_JOINT for joints in (THUMB_FLEXION, FINGER_FLEXION))
+        thumb, fingers = (self.encoders_deg[:, joints].mean(axis=1) for joints in every)
+        mean: Numbers = (thumb + fingers) / 2.0
+        return mean
+
 
 def read_recording(name: str) -> Recording:
     """Return the grasp in this file as a recording, mapped by `recording_of`.
@@ -91,15 +99,12 @@ def recording_of(grasp: IcubGrasp, file: str) -> Recording:
     thumb, and that of the index and middle finger. Time is the frame number. No reading depends on a later frame.
     """
     pressure = FORCE_N_PER_COUNT * (grasp.taxels[0] - grasp.taxels).sum(axis=2)
-    thumb_deg = grasp.encoders_deg[:, [joint - FIRST_JOINT for joint in THUMB_FLEXION]].mean(axis=1)
-    finger_deg = grasp.encoders_deg[:, [joint - FIRST_JOINT for joint in FINGER_FLEXION]].mean(axis=1)
-    flexion_deg = (thumb_deg + finger_deg) / 2.0
     forces = dict(zip((finger.name for finger in HAND), pressure.T, strict=True))
     left, right = finger_sides(HAND, forces)
     columns = GraspColumns(
         source=f"iCub hand, {file}",
         t_s=np.arange(float(len(grasp))),
-        gap_m=START_GAP_M - GAP_M_PER_DEG * (flexion_deg - flexion_deg[0]),
+        gap_m=START_GAP_M - GAP_M_PER_DEG * (grasp.flexion_deg - grasp.flexion_deg[0]),
         left_n=left,
         right_n=right,
         scalars=forces,
@@ -144,19 +149,17 @@ def read_grasp(path: Path) -> IcubGrasp:
 
 def _locate(name: str) -> Path:
     given = Path(os.path.expanduser(name))
-    path = next((p for p in (given, given.parent / DATA_FOLDER / given.name) if p.is_file()), None)
+    places = (given.parent, given.parent / DATA_FOLDER)
+    path = next((place / given.name for place in places if (place / given.name).is_file()), None)
     if path is not None:
         return path
     if given.is_dir():
         raise ConfigError(
             f"{given} is a folder: name a grasp in it, such as {given}/full_vitamin_water_1.txt"
         )
-    folder = given.parent / DATA_FOLDER if (given.parent / DATA_FOLDER).is_dir() else given.parent
-    grasps = [p.name for p in folder.glob("*.txt")]
-    there = f"the folder {folder} has no such file"
-    there = there if folder.is_dir() else f"there is no folder {folder}"
+    grasps = [grasp.name for place in places for grasp in place.glob("*.txt")]
     raise ConfigError(
-        f"no grasp {given}: {there}. Name a file of the iCub Grasp Dataset with its folder, as in "
+        f"there is no grasp {given}: name a file of the iCub Grasp Dataset with its folder, as in "
         f"FOLDER/full_vitamin_water_1.txt.{suggestion(given.name, grasps)}"
     )
 

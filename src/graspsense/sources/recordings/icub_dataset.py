@@ -30,12 +30,10 @@ from graspsense.recording.readable import each_readable, error_of_all, note_on
 from graspsense.recording.replayable import recorded_channels
 from graspsense.sources.recordings.icub import (
     DATA_FOLDER,
-    FINGER_FLEXION,
     FINGERS,
     FIRST_JOINT,
     FORCE_N_PER_COUNT,
     GAP_M_PER_DEG,
-    THUMB_FLEXION,
     IcubGrasp,
     read_grasp,
     recording_of,
@@ -152,13 +150,9 @@ def _grasps(folder: str) -> list[GraspFile]:
 def _absolute(table: FeatureTable, grasps: list[IcubGrasp]) -> FeatureTable:
     values = table.values.copy()
     for i, grasp in enumerate(grasps):
-        thumb, finger = (
-            grasp.encoders_deg[0, [joint - FIRST_JOINT for joint in joints]].mean()
-            for joints in (THUMB_FLEXION, FINGER_FLEXION)
-        )
         pressure = FORCE_N_PER_COUNT * (255.0 - grasp.taxels[0]).sum(axis=1)
         start = {
-            "gap": -GAP_M_PER_DEG * (thumb + finger) / 2.0,
+            "gap": -GAP_M_PER_DEG * grasp.flexion_deg[0],
             "force": (pressure[0] + pressure[1:].max()) / 2.0,
         }
         for name, what in _SHIFTED_BY.items():

@@ -25,6 +25,7 @@ from graspsense.recording.controls import Controls, controls, without_constant_g
 from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
 from graspsense.recording.readable import each_readable, error_of_all, note_on
 from graspsense.recording.replayable import Recording, curve_bytes, grasp_numbers, recorded_channels
+from graspsense.sources.manifest.alike import compared
 from graspsense.sources.recordings.dataset_recordings import failing_as, readable_or_not
 from graspsense.sources.recordings.noise_thresholds import THRESHOLDS, thresholds_for
 from graspsense.store.first_line import NAMES, UNITS, numbers_of
@@ -43,6 +44,7 @@ def labelled_recordings(
     read = list(readable_or_not(kind, place))
     unreadable = [recording for recording in read if isinstance(recording, UnreadableRecording)]
     known = [recording for recording in read if isinstance(recording, LabelledRecording)]
+    known = compared(known, of_file=False)
     fitted, threshold_notes = _fitted(features, [recording.recording for recording in known])
     features = with_checkpoints(fitted, checkpoints_s)
     for recording in known:
