@@ -1,7 +1,7 @@
 """Ticks for another process: each is one non-blocking write to a pipe, and no tick waits.
 
-Messages that the pipe does not take are queued and offered again with the next ticks; what is beyond the limits of the
-queue is dropped and counted.
+What the pipe does not take waits, and is offered again with the next tick; messages beyond a limit are dropped and
+counted.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ import struct
 import subprocess
 import sys
 import time
-from collections import deque
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Any, Final
@@ -35,10 +34,6 @@ from graspsense.recording.layout import (
 )
 
 PIPE_BYTES: Final = 1 << 20
-RETRIES_PER_TICK: Final = 8
-"""Queued messages offered with each new one; the limit keeps a tick short."""
-QUEUE_LIMIT: Final = 500_000
-"""Limit on the messages that wait for the pipe; what is beyond it is dropped, and counted."""
 
 Data = bytes | memoryview
 _pack_tick: Final = TICK_WIRE.pack_into
@@ -68,7 +63,7 @@ class _Channel:
 class Feed:
     """A sink of the runner that passes ticks, images and samples to `python -m MODULE ARGUMENTS` on its standard input.
 
-    `queue_bytes` limits the messages that wait for the pipe. Raises SaveFailed if the process cannot be started. After
+    `queue_bytes` limits what waits for the pipe. Raises SaveFailed if the process cannot be started. After
     that, `take` never raises: another process must not stop a grasp.
     """
 
@@ -92,8 +87,7 @@ class Feed:
         if hasattr(fcntl, "F_SETPIPE_SZ"):
             with suppress(OSError):  # the user's limit of pipe memory
                 fcntl.fcntl(self._fd, fcntl.F_SETPIPE_SZ, PIPE_BYTES)
-        self._waiting: deque[bytes] = deque()
-        self._waiting_bytes, self._queue_bytes = 0, queue_bytes
+        self._waiting, self._queue_bytes = bytearray(), queue_bytes
         self._counter = 0
         self._pads: _Channel | None = None
         self._signals: list[tuple[_Channel, Callable[[Reading], tuple[Any, ...] | None]]] | None = None
@@ -142,20 +136,24 @@ class Feed:
             offset += channel.size
         _pack_tick(self._buffer, offset, IS_TICK, TICK.size, 0, *frame, phase, *command)
         data = self._view[: offset + TICK_WIRE.size]
+        self._keep(data)
         if self._waiting or offset > _MOST_BEFORE_A_TICK:
             self._send(data)
         elif not self._broken:
-            # As `_send`, without the two calls.
+            # As `_send`, without the call.
             try:
                 os.write(self._fd, data)
             except BlockingIOError:
-                self._defer(data)
+                self._send(data)
             except OSError:
                 self._broken = True
         self.ticks += 1
 
+    def _keep(self, data: Data) -> None:
+        """Take what is passed on, also if the pipe does not."""
+
     def _announce(self, topic: Topic) -> _Channel:
-        self._send(json_message(IS_TOPIC, topic.name, topic.type_name, topic.definition))
+        self._pass_on(json_message(IS_TOPIC, topic.name, topic.type_name, topic.definition))
         self._announced += 1
         channel = _Channel(self._announced - 1, topic)
         # The messages that are in the buffer already stay where they are.
@@ -165,58 +163,36 @@ class Feed:
 
     def _told(self, name: str, values: Any) -> None:
         """Pass on JSON values under a name."""
-        self._send(json_message(IS_METADATA, name, values))
+        self._pass_on(json_message(IS_METADATA, name, values))
+
+    def _pass_on(self, data: Data) -> None:
+        self._keep(data)
+        self._send(data)
 
     def _send(self, data: Data) -> None:
+        """Write what waits, and this, as far as the pipe takes it; without a reader, it counts as taking everything."""
         waiting = self._waiting
-        if waiting:
-            self._defer(data)
-            for _ in range(RETRIES_PER_TICK):
-                if not waiting or not self._write(waiting[0]):
-                    return
-                self._waiting_bytes -= len(waiting.popleft())
-        elif not self._write(data):
-            self._defer(data)
-
-    def _defer(self, data: Data) -> None:
-        if len(self._waiting) >= QUEUE_LIMIT or self._waiting_bytes + len(data) > self._queue_bytes:
-            self._dropped += 1
-            return
-        self._waiting.append(bytes(data))
-        self._waiting_bytes += len(data)
-        self._deferred += 1
-        self._most_waiting = max(self._most_waiting, len(self._waiting))
-
-    def _write(self, data: Data) -> bool:
-        """Write to the pipe. Return whether it took the data; a pipe without a reader counts as taking everything.
-
-        What it does not take of data that are longer than `PIPE_BUF` is written first with the next tick.
-        """
         if self._broken:
-            return True
+            return
+        if len(waiting) + len(data) > self._queue_bytes:
+            self._dropped += 1
+        else:
+            waiting += data
         try:
-            written = os.write(self._fd, data)
+            del waiting[: os.write(self._fd, waiting)]
         except BlockingIOError:
-            return False
+            pass
         except OSError:
             self._broken = True
-            return True
-        if written < len(data):
-            unwritten = bytes(data[written:])
-            if self._waiting and self._waiting[0] is data:
-                self._waiting[0] = unwritten
-                self._waiting_bytes -= written
-                return False
-            self._waiting.appendleft(unwritten)
-            self._waiting_bytes += len(unwritten)
-        return True
+            return
+        self._deferred += bool(waiting)
+        self._most_waiting = max(self._most_waiting, len(waiting))
 
     def _drain(self, last: bytes, timeout_s: float) -> None:
         """Write the queue and this message, for at most `timeout_s`, while the pipe has a reader."""
         until = time.monotonic() + timeout_s
-        view = memoryview(b"".join((*self._waiting, last)))
+        view = memoryview(bytes(self._waiting) + last)
         self._waiting.clear()
-        self._waiting_bytes = 0
         while view and not self._broken:
             if not select.select([], [self._fd], [], max(0.0, until - time.monotonic()))[1]:
                 self._broken = True

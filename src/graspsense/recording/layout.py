@@ -261,9 +261,10 @@ class LogClock:
     def log_ns(self, t_s: float, now_ns: int) -> int:
         """Return the time to log a message at that is of the gripper's time `t_s` and has come at `now_ns`."""
         if self._base_ns is None:
-            self._base_ns = now_ns - _ns(t_s)
-        return min(max(0, self._base_ns + _ns(t_s)), _LAST_NS)
+            self._base_ns = now_ns - nanoseconds(t_s)
+        return min(max(0, self._base_ns + nanoseconds(t_s)), _LAST_NS)
 
 
-def _ns(t_s: float) -> int:
+def nanoseconds(t_s: float) -> int:
+    """Return a time (s) in nanoseconds; 0 for one that no clock of a gripper gives."""
     return round(t_s * 1e9) if abs(t_s) < 1e9 else 0
