@@ -1,8 +1,8 @@
 """The sink that records a grasp: it passes each tick to a writer process and never waits for it.
 
 Each tick is one non-blocking write to a pipe. Messages that the pipe does not take are queued and offered again with
-the next ticks. `RecordingInfo` counts them. All messages are kept until the end, so that a writer process that is killed
-loses nothing.
+the next ticks. `RecordingInfo` counts them. All messages are kept until the end, so that nothing is lost with a writer
+process that is killed.
 """
 
 from __future__ import annotations

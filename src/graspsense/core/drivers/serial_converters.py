@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Collection, Iterable, Iterator, Sequence
+from glob import glob
 from typing import Final, Protocol
 
 from graspsense.core.components.entries import Finding, FoundDevice
@@ -11,6 +12,9 @@ from graspsense.core.components.entries import Finding, FoundDevice
 NO_PERMISSION: Final = (
     "add your user to the group dialout (`sudo usermod -aG dialout $USER`), and log in again"
 )
+
+
+BY_ID: Final = "/dev/serial/by-id"
 
 
 class SerialPort(Protocol):
@@ -58,6 +62,12 @@ def why_not_opened(port: str) -> str:
     if not os.access(port, os.R_OK | os.W_OK):
         return "no permission to open it"
     return "it cannot be opened: it is no serial port, or another program uses it"
+
+
+def lasting_port(port: str) -> str:
+    """Return the name under which udev gives this port again after it was unplugged; the port itself without one."""
+    links = (link for link in glob(f"{BY_ID}/*") if os.path.realpath(link) == os.path.realpath(port))
+    return next(links, port)
 
 
 def port_failed(backend: str, port: str, error: Exception) -> Finding:
