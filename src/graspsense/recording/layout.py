@@ -22,7 +22,7 @@ from attrs import field, frozen
 from graspsense.core.components.channels import dtype_of, shape_of
 from graspsense.core.values.channel import FLOATS, TactileArray
 from graspsense.core.values.limits import CHANNEL_NUMBERS
-from graspsense.core.values.signals import Frame, Image, Pads, Reading, Samples
+from graspsense.core.values.signals import Frame, Image, Reading, Samples
 
 VERSION: Final = 2
 """Version of this layout, stored in the metadata record `START` of every recording."""
@@ -185,11 +185,6 @@ def samples_topic(name: str, samples: int, axes: int) -> Topic:
     """Return the topic of a fast channel."""
     definition = f"float64 t_s\nint64 counter\nint64 new\nint64 axes\nfloat64[{samples * axes}] values\n"
     return Topic(SIGNAL_TOPIC + name, f"graspsense_msgs/msg/Samples{samples}x{axes}", definition)
-
-
-def pads_numbers(pads: Pads) -> tuple[Any, ...]:
-    """Return the numbers of the message of an image of the fingertips."""
-    return (pads.t_s, pads.counter, *pads.left, *pads.right)
 
 
 def _image_source(i: int, example: Image) -> Callable[[Reading], tuple[Any, ...] | None]:

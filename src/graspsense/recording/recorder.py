@@ -17,9 +17,10 @@ from typing import Any, Final
 from graspsense.core.files.whole_file import SaveFailed
 from graspsense.core.values.json_values import json_text
 from graspsense.core.values.signals import Command, GraspEvent, Reading, event_as_json
-from graspsense.recording.feed import Data, Feed, json_message
+from graspsense.recording.feed import Data, Feed
 from graspsense.recording.layout import EVENT, IS_END, IS_METADATA, PART, READY, nanoseconds
 from graspsense.recording.recording_info import WRITTEN, RecordingInfo
+from graspsense.recording.tick_messages import json_message
 
 QUEUE_BYTES: Final = 256 << 20
 """Limit on the messages that wait for the pipe, and on those that are kept."""
