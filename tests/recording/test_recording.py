@@ -129,7 +129,6 @@ def test_a_writer_that_does_not_follow_holds_nobody_up_and_loses_nothing(tmp_pat
     recorded = recorder.finish()
     assert recorded.ticks == 9_000
     assert recorded.deferred > 1000
-    assert recorded.most_waiting > 1000
     assert recorded.dropped == 0
     grasp = read_recorded(tmp_path / "g.mcap")
     assert grasp.ticks["t_s"].tolist() == [frame(k).t_s for k in range(9_000)]

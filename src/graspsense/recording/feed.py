@@ -58,7 +58,7 @@ class Feed(TickMessages):
         self.ticks = 0
         """Ticks that were taken."""
         self._broken = False
-        self._deferred = self._most_waiting = self._dropped = 0
+        self._deferred = self._dropped = 0
 
     def _first_line(self, timeout_s: float) -> bytes | None:
         """Return the first line that the process prints: empty if it ends without one, None if none comes in time."""
@@ -117,7 +117,6 @@ class Feed(TickMessages):
             self._broken = True
             return
         self._deferred += bool(waiting)
-        self._most_waiting = max(self._most_waiting, len(waiting))
 
     def _drain(self, last: bytes, timeout_s: float) -> None:
         """Write the queue and this message, for at most `timeout_s`, while the pipe has a reader."""

@@ -87,7 +87,6 @@ class Recorder(Feed):
             path=self.path,
             **{name: answer[name] for name in WRITTEN},
             deferred=self._deferred,
-            most_waiting=self._most_waiting,
             dropped=self._dropped,
         )
 
