@@ -64,18 +64,20 @@ def test_a_grasp_with_pylibfranka(emulated):
 
 
 @pytest.mark.parametrize("phase", ["closing", "holding"])
-@pytest.mark.parametrize("mood", ["silent", "damaged", "late"])
+@pytest.mark.parametrize("mood", ["silent", "damaged", "late", "killed"])
 def test_whatever_becomes_of_its_messages_the_hand_is_told_to_stop(emulated, mood, phase):
-    """The hand still hears: what it is told last is to stop."""
+    """The hand still hears: what it is told last is to stop, also if the process of pylibfranka is killed."""
     hand = emulated(faults=FrankaFaults(late_s=0.05))
     driver = _driver(hand)
     PHASES[phase](driver)
     assert hand.state()["pressing"]
-    hand.tell(mood)
+    driver._link._process.kill() if mood == "killed" else hand.tell(mood)
     with nullcontext() if mood == "late" else pytest.raises(DeviceLost, match=hand.where):
         [driver.read(PATIENT_S) for _ in range(20)]
     driver.close()
-    assert not hand.state()["pressing"]
+    until_s = time.monotonic() + (PATIENT_S if mood == "killed" else 0.0)
+    while hand.state()["pressing"]:
+        assert time.monotonic() < until_s, "it still presses"
 
 
 @pytest.mark.parametrize("phase", PHASES)
@@ -163,17 +165,6 @@ def test_another_version_is_no_device_and_listed_as_not_ready_and_another_device
         assert list(found_devices(PATIENT_S, "127.0.0.77")) == []
         answers.join()
     assert list(found_devices(1.0, "127.0.0.77")) == []
-
-
-def test_a_process_of_pylibfranka_that_is_killed_leaves_no_hand_that_presses(emulated):
-    hand = emulated()
-    driver = _driver(hand)
-    PHASES["holding"](driver)
-    driver._link._process.kill()
-    driver.close()
-    until_s = time.monotonic() + PATIENT_S
-    while hand.state()["pressing"]:
-        assert time.monotonic() < until_s, "it still presses"
 
 
 def test_a_program_that_is_killed_leaves_no_hand_that_presses(emulated):

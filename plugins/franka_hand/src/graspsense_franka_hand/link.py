@@ -17,8 +17,6 @@ from graspsense_franka_hand.orders import HandGone, HandState, Order
 
 CONNECT_S: Final = 8.0
 CLOSE_S: Final = 3.0
-STOP: Final = "graspsense_franka_hand.hand_process:stop"
-"""What is called if the process of pylibfranka was killed, or hangs, and therefore has not stopped the fingers."""
 
 
 @final
@@ -76,7 +74,8 @@ class LibfrankaLink:
         except subprocess.TimeoutExpired:
             self._process.kill()
         if self._process.wait() and self._ordered:
-            DeadManSwitch(STOP, self._host).release(stopped=False)
+            # It was killed, or hangs, and has not stopped the fingers.
+            DeadManSwitch("graspsense_franka_hand.hand_process:stop", self._host).release(stopped=False)
         self._reader.close()
         self._process.stdout.close()
 

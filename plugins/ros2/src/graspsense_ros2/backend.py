@@ -58,8 +58,6 @@ STATUS_BITS: Final = (
         "them",
     ),
 )
-OPEN: Final = "graspsense_ros2.backend:opened_by_itself"
-"""What is called if the program is killed."""
 _MUST_BE_NUMBERS: Final = frozenset({"gap", "force_left", "force_right"})
 
 
@@ -110,7 +108,7 @@ class Ros2Backend(SensorBackend[Ros2Config]):
                     raise NoDevice(f"no message on {newest.topic}, although it is announced{_damage(newest)}")
             self._action = self._answering(until)
             action = (self.config.through, self.config.action, self.config.action_type, self.config.joint)
-            self._switch = DeadManSwitch(OPEN, *action, *astuple(self._opening()))
+            self._switch = DeadManSwitch(f"{__name__}:opened_by_itself", *action, *astuple(self._opening()))
             self._polling = Polling(self.config.rate_hz, self.clock)
             self._good = dict.fromkeys(self._numbers, (nan, self._polling.began_s))
             self._gap_m = self._measured()["gap"]
