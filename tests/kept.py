@@ -6,7 +6,7 @@ from math import inf, nan
 from attrs import evolve
 
 from graspsense.core.values.signals import EFFORT, Command, Frame, Pads
-from graspsense.recording.layout import DEVICE, RESULT, START, TICK, pads_numbers, pads_topic
+from graspsense.recording.layout import DEVICE, RESULT, START, TICK, pads_topic
 from graspsense.recording.recording_info import RecordingInfo
 from graspsense.recording.trial_record import DeviceRecord, TrialRecord, TrialResult, stored_features
 from graspsense.recording.writer import RecordingWriter
@@ -85,7 +85,7 @@ def write_recording(path, ticks=120, record=None, finish=True, grasp=0, **texts)
     for k in range(ticks):
         image = pads(k)
         if k == 0 or pads(k - 1).counter != image.counter:
-            file.signal(number, layout.wire.pack(*pads_numbers(image)))
+            file.signal(number, layout.wire.pack(image.t_s, image.counter, *image.left, *image.right))
         measured = frame(k)._replace(effort_n=5.0 + grasp)
         file.tick(TICK.pack(*measured, 3, *command(k)))
     if record.result is not None:

@@ -4,8 +4,8 @@
 from graspsense.core.components.entries import FoundDevice as FoundDevice
 from graspsense.core.components.entries import Finding as Finding
 from graspsense.core.drivers.discovery_hooks import discovery_hooks as discovery_hooks
-from graspsense.core.drivers.serial_converters import converter_findings as converter_findings
-from graspsense.core.drivers.serial_converters import found_converters as found_converters
+from graspsense.core.drivers.serial_converters import GripperAtPort as GripperAtPort
+from graspsense.core.drivers.serial_converters import lasting_port as lasting_port
 from graspsense.core.drivers.serial_converters import port_failed as port_failed
 from graspsense.core.drivers.serial_converters import why_not_opened as why_not_opened
 from graspsense.core.components.caller import set_option as set_option

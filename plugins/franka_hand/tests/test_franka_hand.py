@@ -211,7 +211,7 @@ def test_the_hand_answers_each_command_as_libfranka_expects():
     assert hand.pressing
     hand.ask(HandRequest(STOP, 5, ()), 6.0)
     assert not hand.pressing
-    hand.close()
+    hand.fingers.close()
 
 
 REQUESTS = st.one_of(

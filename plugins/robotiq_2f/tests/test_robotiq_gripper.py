@@ -130,7 +130,7 @@ def test_a_gripper_lost_in_a_grasp_ends_it_and_is_told(fault, at_s):
 
 
 def test_a_ur_cap_takes_all_bytes_and_answers_each_line(emulated):
-    hand = emulated("ur")._hand
+    hand = emulated("ur").hand
     assert ur_cap.answered(hand, b"GET POS\nGET FOR\nSET PO", 1.0) == (b"POS 3\nFOR 0\n", b"SET PO")
     assert ur_cap.answered(hand, b"SET ACT 1 GTO 1 POS 100\nGET PRE\n", 1.0) == (b"ackPRE 100\n", b"")
     for line in (b"SET POS 256\n", b"SET XYZ 1\n", b"SET POS\n", b"PUT POS 1\n", b"\xff\n", b"\n"):
@@ -169,12 +169,12 @@ def test_fingers_that_open_slowly_begin_at_once(emulated):
     driver.read(0.1)
     driver.apply(Command(POSITION, 0.085, 25.0, 0.01))
     driver.read(0.1)
-    assert MODELS["2f-85"].gap_m(gripper._hand.registers[1]) > frame.gap_m
+    assert MODELS["2f-85"].gap_m(gripper.hand.registers[1]) > frame.gap_m
     driver.close()
 
 
 def test_requests_that_come_together_are_all_answered(emulated):
-    hand = emulated()._hand
+    hand = emulated().hand
     asks = [struct.pack(">BBHHHHBBB", 9, 23, INPUT, 3, OUTPUT, 1, 2, 9, go) for go in (0, 8)]
     together = b"".join(ask + checksum(ask) for ask in asks)
     replies, left = answered(hand, 9, together + asks[0][:5], 1.0)
@@ -225,7 +225,7 @@ def test_a_gripper_that_lost_its_power_is_not_activated_around_the_object(emulat
     driver.apply(Command(VELOCITY, 0.0, 25.0, 0.15))
     driver.close()
     assert not gripper.state()["going"]
-    assert gripper._hand.active_since_s == np.inf
+    assert gripper.hand.active_since_s == np.inf
 
     driver.open(1)
     assert driver.read(0.1) is not None
@@ -285,7 +285,7 @@ def test_an_active_gripper_is_not_activated_again(emulated):
     gripper, activated = emulated(), set()
     for _ in range(2):
         opened(gripper).close()
-        activated.add(gripper._hand.active_since_s)
+        activated.add(gripper.hand.active_since_s)
     assert len(activated) == 1
 
 

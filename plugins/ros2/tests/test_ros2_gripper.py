@@ -1,7 +1,11 @@
 """A gripper behind ROS 2, against a robot in another process, sound and with faults."""
 
+import subprocess
+import sys
+import time
+
 import pytest
-from robots import OPTIONS, InStep
+from robots import OPTIONS, PATIENCE_S, STEPPED, InStep
 
 from graspsense.core.pipeline.pipeline import load_pipeline
 from graspsense.core.values.signals import Outcome
@@ -93,3 +97,18 @@ def test_goals_that_are_refused_end_the_grasp(grasped):
 
     assert trial.outcome == Outcome.DEVICE_LOST
     assert "refuses" in trial.reason
+
+
+@pytest.mark.slow
+def test_a_program_that_is_killed_leaves_open_fingers(robot):
+    fake = robot()
+    words = [word for option in (*OPTIONS, "run.hold_s=100") for word in ("-o", option)]
+    until_s = time.monotonic() + PATIENCE_S
+    with subprocess.Popen([sys.executable, STEPPED, str(fake.port), "run", *words]) as running:
+        while not any(goal["position"] < OBJECT_M for goal in fake.goals()):
+            assert time.monotonic() < until_s, "it never closes"
+            time.sleep(0.1)
+        running.kill()
+    while fake.goals()[-1]["position"] != 0.085:
+        assert time.monotonic() < until_s, "it is never told to open"
+        time.sleep(0.1)

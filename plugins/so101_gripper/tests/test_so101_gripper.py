@@ -15,6 +15,7 @@ from emulated_grippers import (
 )
 
 from graspsense import WiringError, load_pipeline
+from graspsense.core.drivers import serial_converters
 from graspsense.plugin_api import (
     POSITION,
     VELOCITY,
@@ -190,11 +191,13 @@ def test_a_program_that_is_killed_leaves_no_gripper_that_presses(emulated):
     assert_a_killed_program_lets_go("so101", lambda: arm.state()["torque"], 8.0, **settings)
 
 
-def test_a_gripper_whose_cable_is_plugged_in_again_no_longer_presses(emulated, tmp_path):
+@every_case("named", ["port", "by-id"])
+def test_a_gripper_whose_cable_is_plugged_in_again_no_longer_presses(emulated, tmp_path, monkeypatch, named):
     """A port that is found by its number, as in /dev/serial/by-id, has its name again."""
+    monkeypatch.setattr(serial_converters, "BY_ID", str(tmp_path))
     arm, port = emulated(), tmp_path / "port"
     port.symlink_to(arm.where)
-    driver = opened(arm, port=str(port))
+    driver = opened(arm, port=str(port) if named == "port" else arm.where)
     driver.read(0.1)
     driver.apply(Command(VELOCITY, -0.03, 8.0, 0.15))
     arm.tell("unplug")

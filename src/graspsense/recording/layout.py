@@ -22,7 +22,7 @@ from attrs import field, frozen
 from graspsense.core.components.channels import dtype_of, shape_of
 from graspsense.core.values.channel import FLOATS, TactileArray
 from graspsense.core.values.limits import CHANNEL_NUMBERS
-from graspsense.core.values.signals import Frame, Image, Pads, Reading, Samples
+from graspsense.core.values.signals import Frame, Image, Reading, Samples
 
 VERSION: Final = 2
 """Version of this layout, stored in the metadata record `START` of every recording."""
@@ -187,11 +187,6 @@ def samples_topic(name: str, samples: int, axes: int) -> Topic:
     return Topic(SIGNAL_TOPIC + name, f"graspsense_msgs/msg/Samples{samples}x{axes}", definition)
 
 
-def pads_numbers(pads: Pads) -> tuple[Any, ...]:
-    """Return the numbers of the message of an image of the fingertips."""
-    return (pads.t_s, pads.counter, *pads.left, *pads.right)
-
-
 def _image_source(i: int, example: Image) -> Callable[[Reading], tuple[Any, ...] | None]:
     last, dtype, several = 0, dtype_of(example), len(shape_of(example)) > 1
 
@@ -261,9 +256,10 @@ class LogClock:
     def log_ns(self, t_s: float, now_ns: int) -> int:
         """Return the time to log a message at that is of the gripper's time `t_s` and has come at `now_ns`."""
         if self._base_ns is None:
-            self._base_ns = now_ns - _ns(t_s)
-        return min(max(0, self._base_ns + _ns(t_s)), _LAST_NS)
+            self._base_ns = now_ns - nanoseconds(t_s)
+        return min(max(0, self._base_ns + nanoseconds(t_s)), _LAST_NS)
 
 
-def _ns(t_s: float) -> int:
+def nanoseconds(t_s: float) -> int:
+    """Return a time (s) in nanoseconds; 0 for one that no clock of a gripper gives."""
     return round(t_s * 1e9) if abs(t_s) < 1e9 else 0

@@ -16,8 +16,8 @@ WRITTEN: Final = ("sha256", "size", "ticks", "images")
 class RecordingInfo:
     """A complete recording on the disk.
 
-    `deferred` counts the messages that the pipe to the writer process did not take at once, `most_waiting` the
-    longest queue of such messages, and `dropped` the messages that were given up.
+    `deferred` counts the messages that the pipe to the writer process did not take at once, and `dropped` those that
+    were given up.
     """
 
     path: Path
@@ -27,7 +27,6 @@ class RecordingInfo:
     ticks: int
     images: int
     deferred: int = 0
-    most_waiting: int = 0
     dropped: int = 0
 
     @property

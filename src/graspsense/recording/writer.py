@@ -9,6 +9,7 @@ from __future__ import annotations
 import errno
 import fcntl
 import hashlib
+import json
 import os
 import struct
 import time
@@ -20,8 +21,21 @@ from mcap.writer import CompressionType, Writer
 
 from graspsense import __version__
 from graspsense.core.files.whole_file import sync_folder
-from graspsense.recording.layout import CDR_HEADER, PADS_TOPIC, PART, TICK_SCHEMA, TICK_TOPIC, LogClock, Topic
+from graspsense.recording.layout import (
+    CDR_HEADER,
+    IS_END,
+    IS_SIGNAL,
+    IS_TICK,
+    IS_TOPIC,
+    PADS_TOPIC,
+    PART,
+    TICK_SCHEMA,
+    TICK_TOPIC,
+    LogClock,
+    Topic,
+)
 from graspsense.recording.recording_info import RecordingInfo
+from graspsense.recording.wire_messages import complete_messages
 
 CHUNK_NS: Final = 50_000_000
 _T_S: Final = struct.Struct("<d")
@@ -80,6 +94,21 @@ class RecordingWriter:
     def signal(self, number: int, body: bytes) -> None:
         """Write a message of the topic with this number, packed as `Topic.wire`."""
         self._add(self._topics[number], body)
+
+    def messages(self, buffer: bytearray) -> bool:
+        """Write every complete message and remove it from the buffer. Return whether the trial is over."""
+        for kind, number, body in complete_messages(buffer):
+            if kind == IS_END:
+                return True
+            if kind == IS_TICK:
+                self.tick(body)
+            elif kind == IS_SIGNAL:
+                self.signal(number, body)
+            elif kind == IS_TOPIC:
+                self.topic(Topic(*json.loads(body)))
+            else:
+                self.metadata(*json.loads(body))
+        return False
 
     def finish(self) -> RecordingInfo:
         """Finish the file, wait until the disk has it, and give it its final name."""

@@ -15,9 +15,9 @@ import time
 from pathlib import Path
 from typing import Final
 
-from graspsense.recording.layout import IS_END, IS_SIGNAL, IS_TICK, IS_TOPIC, READY, Topic
+from graspsense.recording.layout import READY
 from graspsense.recording.recording_info import WRITTEN
-from graspsense.recording.wire_messages import complete_messages, leave_control_alone
+from graspsense.recording.wire_messages import leave_control_alone
 from graspsense.recording.writer import RecordingWriter
 
 READ_EVERY_S: Final = 0.01
@@ -53,27 +53,11 @@ def _write(path: Path) -> dict[str, object]:
                 file.remove()
             return {"left": True, "ticks": file.ticks}
         buffer += data
-        if _write_messages(file, buffer):
+        if file.messages(buffer):
             written = file.finish()
             return {name: getattr(written, name) for name in WRITTEN}
         if len(data) < BEHIND:
             time.sleep(READ_EVERY_S)
-
-
-def _write_messages(file: RecordingWriter, buffer: bytearray) -> bool:
-    """Write every complete message and remove it from the buffer. Return whether the trial is over."""
-    for kind, number, body in complete_messages(buffer):
-        if kind == IS_END:
-            return True
-        if kind == IS_TICK:
-            file.tick(body)
-        elif kind == IS_SIGNAL:
-            file.signal(number, body)
-        elif kind == IS_TOPIC:
-            file.topic(Topic(*json.loads(body)))
-        else:
-            file.metadata(*json.loads(body))
-    return False
 
 
 if __name__ == "__main__":

@@ -49,16 +49,19 @@ class Gone(Exception):
 
 
 class HandProcess:
-    """A hand at this address, with the forks that read its states and give it a command."""
+    """A hand at this address, with the forks that read its states and give it a command.
 
-    def __init__(self, host: str) -> None:
+    `ordered`: it was told something, so that its fingers have to stop in the end.
+    """
+
+    def __init__(self, host: str, *, ordered: bool = False) -> None:
         self._host = host
         self._hand = _connected(host)
         self._reader: Fork | None = _forked(self._read_states)
         self._giver: Fork | None = None
         self._orders = self._states = b""
         self._done = 0
-        self._ordered = False
+        self._ordered = ordered
         self._refused = ""
 
     def serve(self) -> None:
@@ -203,6 +206,11 @@ def _connected(host: str) -> Any:
 
 def _tell(pipe: int, message: dict[str, Any]) -> None:
     os.write(pipe, json.dumps(message).encode() + b"\n")
+
+
+def stop(host: str) -> None:
+    """Tell the hand at this address to stop, in a process whose input has ended. Raises what pylibfranka raises."""
+    HandProcess(host, ordered=True).serve()
 
 
 def main() -> None:

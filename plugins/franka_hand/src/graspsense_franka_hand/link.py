@@ -11,7 +11,7 @@ import sys
 from contextlib import suppress
 from typing import Final, final
 
-from graspsense.gripper_api import ReadingThread, set_option
+from graspsense.gripper_api import DeadManSwitch, ReadingThread, set_option
 from graspsense.plugin_api import PluginUnavailable
 from graspsense_franka_hand.orders import HandGone, HandState, Order
 
@@ -30,6 +30,7 @@ class LibfrankaLink:
                 "  try: pip install pylibfranka (wheels for Linux on x86_64 with glibc 2.34, Python up to 3.12)\n"
                 f"  without a hand: {set_option('gripper.host=emulated')} needs nothing"
             )
+        self._host, self._ordered = host, False
         self._process = subprocess.Popen(
             [sys.executable, "-P", "-m", "graspsense_franka_hand.hand_process", host],
             stdin=subprocess.PIPE,
@@ -56,6 +57,7 @@ class LibfrankaLink:
     def send(self, order: Order) -> None:
         """Order it; what it still does is stopped first. Raises HandGone."""
         assert self._process.stdin is not None
+        self._ordered = True
         try:
             os.write(self._process.stdin.fileno(), json.dumps(list(order)).encode() + b"\n")
         except OSError as error:
@@ -71,7 +73,9 @@ class LibfrankaLink:
             self._process.wait(CLOSE_S)
         except subprocess.TimeoutExpired:
             self._process.kill()
-            self._process.wait()
+        if self._process.wait() and self._ordered:
+            # It was killed, or hangs, and has not stopped the fingers.
+            DeadManSwitch("graspsense_franka_hand.hand_process:stop", self._host).release(stopped=False)
         self._reader.close()
         self._process.stdout.close()
 

@@ -15,6 +15,7 @@ from graspsense.gripper_api import (
     DeadManSwitch,
     Polling,
     finger_target,
+    lasting_port,
     no_pads,
     pad_force,
     tare,
@@ -122,7 +123,8 @@ class RobotiqBackend(BackendWithEmulator[RobotiqConfig]):
             self._emulated = LockStepGripper(config, seed) if config.emulated else None
             self._link = self._emulated or opened_link(config.port, config.address, config.reply_timeout_s)
             if self._emulated is None:
-                self._switch = DeadManSwitch(LET_GO, config.port, config.address, config.reply_timeout_s)
+                port = lasting_port(config.port)
+                self._switch = DeadManSwitch(LET_GO, port, config.address, config.reply_timeout_s)
             self._polling = Polling(RATE_HZ, self._emulated or time)
             status = self._activated()
             self._open_fingertips()

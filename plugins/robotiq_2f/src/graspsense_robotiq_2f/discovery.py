@@ -2,40 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import Final
+from collections.abc import Iterator
 
-from graspsense.gripper_api import Finding, FoundDevice, converter_findings, found_converters, port_failed
+from graspsense.gripper_api import Finding, GripperAtPort, port_failed
 from graspsense_robotiq_2f.config import RobotiqConfig
 from graspsense_robotiq_2f.link import NoReply
 from graspsense_robotiq_2f.registers import MODELS, STATUS_BITS, bit_of, status_of
 from graspsense_robotiq_2f.ur_cap import opened_link
 
-CONVERTERS: Final = {(0x0403, 0x6001), (0x0403, 0x6015)}
-"""USB numbers of the FTDI chips in RS-485 converters. Others have them too."""
-
-
-def found_devices(timeout_s: float) -> Sequence[FoundDevice]:
-    """Return the converters, to which nothing is sent: what hangs on them is not known before it is asked."""
-    from serial.tools.list_ports import comports
-
-    return found_converters(
-        comports(), "robotiq", CONVERTERS, "an RS-485 converter, perhaps of a Robotiq gripper"
-    )
-
-
-def diagnose(config: object, timeout_s: float) -> Iterator[Finding]:
-    """Return the findings about the gripper of these settings, by default about the converters. No finger moves."""
-    if config is None:
-        yield from converter_findings(found_devices(timeout_s), "robotiq", "a Robotiq gripper")
-    elif isinstance(config, RobotiqConfig):
-        yield from _asked(config, timeout_s)
-
 
 def _asked(config: RobotiqConfig, timeout_s: float) -> Iterator[Finding]:
-    if config.emulated:
-        yield Finding("robotiq", "note", "gripper.port is emulated, so no device is searched")
-        return
     model = MODELS[config.model]
     try:
         link = opened_link(config.port, config.address, min(config.reply_timeout_s, timeout_s))
@@ -63,3 +39,15 @@ def _asked(config: RobotiqConfig, timeout_s: float) -> Iterator[Finding]:
     for bit in STATUS_BITS:
         if bit.mask & bit_of(status.fault):
             yield Finding("robotiq", "problem", f"fault {status.fault}: {bit.name}", bit.meaning)
+
+
+_ROBOTIQ = GripperAtPort(
+    backend="robotiq",
+    gripper="a Robotiq gripper",
+    converter="an RS-485 converter",
+    # The FTDI chips in such converters.
+    usb_numbers={(0x0403, 0x6001), (0x0403, 0x6015)},
+    settings=RobotiqConfig,
+    asked=_asked,
+)
+found_devices, diagnose = _ROBOTIQ.found_devices, _ROBOTIQ.diagnose

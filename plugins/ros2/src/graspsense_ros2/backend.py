@@ -10,7 +10,9 @@ from math import inf, isfinite, nan
 from types import MappingProxyType
 from typing import ClassVar, Final, final
 
-from graspsense.gripper_api import Clock, Polling, StatusBit, finger_target
+from attrs import astuple
+
+from graspsense.gripper_api import Clock, DeadManSwitch, Polling, StatusBit, finger_target
 from graspsense.plugin_api import (
     FORCE,
     NO_PADS,
@@ -25,10 +27,10 @@ from graspsense.plugin_api import (
     SensorBackend,
 )
 from graspsense.simulator_api import CHANNELS
-from graspsense_ros2.action_client import MOST_FAILURES, GripperAction, Target
+from graspsense_ros2.action_client import MOST_FAILURES, ActionType, GripperAction, Target
 from graspsense_ros2.config import Ros2Config
 from graspsense_ros2.message_types import is_known
-from graspsense_ros2.middleware import open_node
+from graspsense_ros2.middleware import Through, open_node
 from graspsense_ros2.newest_messages import NewestMessage
 from graspsense_ros2.node import Node, ServiceFailed
 
@@ -79,6 +81,7 @@ class Ros2Backend(SensorBackend[Ros2Config]):
         self._numbers = config.numbers()
         self._node: Node | None = None
         self._action: GripperAction | None = None
+        self._switch: DeadManSwitch | None = None
         self._topics: dict[str, NewestMessage] = {}
         self._polling = Polling(config.rate_hz, self.clock)
         self._report: dict[str, float | int | str | bool] = {}
@@ -104,6 +107,8 @@ class Ros2Backend(SensorBackend[Ros2Config]):
                 if not newest.came and not newest.columns:
                     raise NoDevice(f"no message on {newest.topic}, although it is announced{_damage(newest)}")
             self._action = self._answering(until)
+            action = (self.config.through, self.config.action, self.config.action_type, self.config.joint)
+            self._switch = DeadManSwitch(f"{__name__}:opened_by_itself", *action, *astuple(self._opening()))
             self._polling = Polling(self.config.rate_hz, self.clock)
             self._good = dict.fromkeys(self._numbers, (nan, self._polling.began_s))
             self._gap_m = self._measured()["gap"]
@@ -179,6 +184,9 @@ class Ros2Backend(SensorBackend[Ros2Config]):
             }
         if node is not None:
             node.close()
+        switch, self._switch = self._switch, None
+        if switch is not None:
+            switch.release()
 
     def report(self) -> dict[str, float | int | str | bool]:
         """Return the number of frames, of goals, and of messages that could not be used."""
@@ -191,10 +199,13 @@ class Ros2Backend(SensorBackend[Ros2Config]):
         repeated = sum(topic.repeated + topic.late for topic in newest) - self._repeated
         return MESSAGES_LATE * late + MESSAGES_REPEATED * (repeated >= REPEATED)
 
-    def _told_to_open(self, action: GripperAction) -> bool:
+    def _opening(self) -> Target:
         config = self.config
+        return Target(config.position_open, config.effort_limit_n, config.speed_limit_m_s)
+
+    def _told_to_open(self, action: GripperAction) -> bool:
         with suppress(ServiceFailed):
-            action.send(Target(config.position_open, config.effort_limit_n, config.speed_limit_m_s))
+            action.send(self._opening())
             return True
         with suppress(ServiceFailed):
             action.cancel()
@@ -289,6 +300,19 @@ class Ros2Backend(SensorBackend[Ros2Config]):
                 "forces and gap are those of ROS topics; their calibration and their zero are a matter of the driver",
             ),
         )
+
+
+def opened_by_itself(
+    through: Through, name: str, kind: ActionType, joint: str, position: float, effort: float, speed: float
+) -> None:
+    """Tell the gripper of a killed program to open. Raises ServiceFailed, ConfigError."""
+    node = open_node(f"graspsense_opening_{os.getpid()}", through)
+    try:
+        action = GripperAction(node, name, kind, joint)
+        action.send(Target(position, effort, speed))
+        action.end()
+    finally:
+        node.close()
 
 
 def _damage(newest: NewestMessage) -> str:

@@ -10,7 +10,14 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final, TypeVar, final
 
-from graspsense.gripper_api import BackendWithEmulator, DeadManSwitch, Polling, calibrations_of, finger_target
+from graspsense.gripper_api import (
+    BackendWithEmulator,
+    DeadManSwitch,
+    Polling,
+    calibrations_of,
+    finger_target,
+    lasting_port,
+)
 from graspsense.plugin_api import (
     NO_PADS,
     POSITION,
@@ -112,9 +119,8 @@ class So101Backend(BackendWithEmulator[So101Config]):
             state = self._state()
             self._found, self._position, self._stopped = state.asked, state.position, True
             if self._emulated is None:
-                self._switch = DeadManSwitch(
-                    STOP, config.port, config.motor, config.reply_timeout_s, *state.asked
-                )
+                port = lasting_port(config.port)
+                self._switch = DeadManSwitch(STOP, port, config.motor, config.reply_timeout_s, *state.asked)
             self._ask(self._asked_of(state.position, SPEED_LIMIT_M_S, config.moving_force_n))
         except (OSError, NoStatusPacket, Unfit) as error:
             self.close()

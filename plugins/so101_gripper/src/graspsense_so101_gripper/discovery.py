@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
-from graspsense.gripper_api import Finding, FoundDevice, converter_findings, found_converters, port_failed
+from graspsense.gripper_api import Finding, GripperAtPort, port_failed
 from graspsense.plugin_api import ConfigError, DataDamaged
 from graspsense_so101_gripper.arm_calibration import read_arm_calibration
 from graspsense_so101_gripper.bus import NoStatusPacket, ServoBus
@@ -23,8 +23,6 @@ from graspsense_so101_gripper.registers import (
     motor_state,
 )
 
-CONVERTERS: Final = {(0x1A86, 0x55D3), (0x1A86, 0x7523)}
-"""USB numbers of the CH343 and CH340 chips on bus boards of such arms. Others have them too."""
 MOTORS: Final = range(1, 7)
 
 
@@ -39,25 +37,7 @@ def serial_number(config: So101Config, port: str) -> str:
     return f"{board}-{config.motor}"
 
 
-def found_devices(timeout_s: float) -> Sequence[FoundDevice]:
-    """Return the converters, to which nothing is sent: what hangs on them is not known before it is asked."""
-    from serial.tools.list_ports import comports
-
-    return found_converters(comports(), "so101", CONVERTERS, "a serial converter, perhaps of an SO-101 arm")
-
-
-def diagnose(config: object, timeout_s: float) -> Iterator[Finding]:
-    """Return the findings about the gripper of these settings, by default about the converters. Nothing moves."""
-    if config is None:
-        yield from converter_findings(found_devices(timeout_s), "so101", "an SO-101 arm")
-    elif isinstance(config, So101Config):
-        yield from _asked(config, timeout_s)
-
-
 def _asked(config: So101Config, timeout_s: float) -> Iterator[Finding]:
-    if config.emulated:
-        yield Finding("so101", "note", "gripper.port is emulated, so no device is searched")
-        return
     try:
         bus = ServoBus(config.port, min(config.reply_timeout_s, timeout_s))
     except OSError as error:
@@ -111,3 +91,15 @@ def _answering(bus: ServoBus) -> Iterator[int]:
         except (NoStatusPacket, OSError):
             continue
         yield motor
+
+
+_SO101 = GripperAtPort(
+    backend="so101",
+    gripper="an SO-101 arm",
+    converter="a serial converter",
+    # The CH343 and CH340 chips on bus boards of such arms.
+    usb_numbers={(0x1A86, 0x55D3), (0x1A86, 0x7523)},
+    settings=So101Config,
+    asked=_asked,
+)
+found_devices, diagnose = _SO101.found_devices, _SO101.diagnose

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from math import inf
-from typing import Any, ClassVar, Final, NamedTuple, TypeVar
+from typing import Any, ClassVar, Final, Generic, NamedTuple, Protocol, TypeVar
 
 from attrs import evolve, fields, frozen
 
@@ -91,14 +91,24 @@ def _unopened(body: str, settings: Mapping[str, Any], scene: str | None) -> Sens
     return backend
 
 
-class LockStepDevice:
-    """An emulated gripper in this process, as the clock of its driver: its time passes only while somebody waits.
+class MovedFingers(Protocol):
+    """What moves the fingers of an emulated gripper. It is active since this time (s), infinity while it is not."""
 
-    `body` is what its fingers move, as `opened_body` gives it.
-    """
+    fingers: EmulatedFingers
+    active_since_s: float
 
-    def __init__(self, body: SensorBackend[Any]) -> None:
-        self.body = body
+    def look(self, now_s: float) -> object:
+        """Move up to this time (s)."""
+
+
+HandT = TypeVar("HandT", bound=MovedFingers)
+
+
+class LockStepDevice(Generic[HandT]):
+    """An emulated gripper in this process, as the clock of its driver: its time passes only while somebody waits."""
+
+    def __init__(self, hand: HandT) -> None:
+        self.hand, self.body = hand, hand.fingers.body
         self._now_s = 0.0
 
     def monotonic(self) -> float:
@@ -108,6 +118,10 @@ class LockStepDevice:
     def sleep(self, seconds: float) -> None:
         """Let this time pass."""
         self._now_s += seconds
+
+    def close(self) -> None:
+        """Release the body."""
+        self.hand.fingers.close()
 
 
 EmulatorSettingsT = TypeVar("EmulatorSettingsT", bound=EmulatorSettings)

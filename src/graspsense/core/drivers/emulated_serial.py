@@ -15,11 +15,12 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from math import inf
-from typing import ClassVar, Final, Literal, NamedTuple, final
+from typing import ClassVar, Final, Generic, Literal, NamedTuple, final
 
 from attrs import frozen
 
 from graspsense.core.components.setting import setting
+from graspsense.core.drivers.emulated_body import HandT
 
 
 class EmulatedDevice(ABC):
@@ -247,11 +248,11 @@ class LateReply(NamedTuple):
     late_s: float
 
 
-class EmulatedSerial(EmulatedDevice):
+class EmulatedSerial(EmulatedDevice, Generic[HandT]):
     """A device behind an `EmulatedPort`, in the time (s) of the host since it was made.
 
-    A subclass answers requests and moves its fingers; both are called under a lock, never at the same time. What they
-    raise ends the device as a lost one, since the body of the fingers can be a user's code.
+    A subclass answers requests, and `hand` moves its fingers; both are called under a lock, never at the same time.
+    What they raise ends the device as a lost one, since the body of the fingers can be a user's code.
     """
 
     moods: ClassVar[Mapping[str, str]] = {
@@ -262,8 +263,8 @@ class EmulatedSerial(EmulatedDevice):
         "repeated": "send each reply twice",
     }
 
-    def __init__(self, wire: str, faults: EmulatorFaults) -> None:
-        self.wire = wire
+    def __init__(self, wire: str, faults: EmulatorFaults, hand: HandT) -> None:
+        self.wire, self.hand = wire, hand
         self._faults = faults
         self._lock = threading.Lock()
         self._began_s = time.monotonic()
@@ -276,16 +277,12 @@ class EmulatedSerial(EmulatedDevice):
         """Return the replies to the requests that these bytes complete; `b""` forgets what is incomplete."""
 
     @abstractmethod
-    def move(self, now_s: float) -> None:
-        """Move the fingers up to this time."""
+    def details(self) -> Mapping[str, float | int | str | bool]:
+        """Return what `state` tells besides the port, gap and effort."""
 
-    @abstractmethod
     def active_s(self, now_s: float) -> float:
         """Return for how long (s) the device has been active; -inf if it is not."""
-
-    @abstractmethod
-    def details(self) -> Mapping[str, float | int | str | bool]:
-        """Return what `state` tells besides the port."""
+        return now_s - self.hand.active_since_s
 
     def reply(self, data: bytes, now_s: float) -> LateReply | None:
         """Return what comes on the line after these bytes, with the faults of the line; None: the cable is pulled."""
@@ -296,7 +293,7 @@ class EmulatedSerial(EmulatedDevice):
         return self._as_sent(reply, now_s)
 
     def unasked(self, now_s: float) -> bytes:
-        """Return what the device sends by itself at this time; `move` was called before."""
+        """Return what the device sends by itself at this time, up to which the fingers have moved."""
         return b""
 
     def opened_port(self) -> EmulatedPort:
@@ -324,19 +321,22 @@ class EmulatedSerial(EmulatedDevice):
         """Return where it is reached, and the state of its fingers."""
         with self._lock:
             if not self._failed:
-                self.move(self._now_s())
+                self.hand.look(self._now_s())
             return {
                 "port": self.where,
                 "plugged": self._port is not None,
                 "mood": self._mood_at(self._now_s()),
                 "requests": self._requests,
+                "gap_m": round(self.hand.fingers.gap_m, 5),
+                "effort_n": round(self.hand.fingers.effort_n, 3),
                 **self.details(),
                 "failed": self._failed,
             }
 
     def close(self) -> None:
-        """Unplug it."""
+        """Unplug it and release the body."""
         self.unplug()
+        self.hand.fingers.close()
 
     def _now_s(self) -> float:
         return time.monotonic() - self._began_s
@@ -362,7 +362,7 @@ class EmulatedSerial(EmulatedDevice):
         return self._sent(self._moved)
 
     def _moved(self, now_s: float) -> LateReply:
-        self.move(now_s)
+        self.hand.look(now_s)
         return self._as_sent(self.unasked(now_s), now_s)
 
     def _sent(self, made: Callable[[float], LateReply | None]) -> bytes:

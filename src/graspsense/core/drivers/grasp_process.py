@@ -2,7 +2,7 @@
 
 The process is a new interpreter, so that the script of the caller is not imported a second time. It reads a line of
 JSON with what all grasps have in common, and then a line for each grasp. It answers with a line of JSON, followed by
-the columns of the trace in numpy's npy format.
+the columns of the trace in numpy's npz format.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from types import TracebackType
 from typing import IO, Any, Final, NamedTuple, Self
 
 import numpy as np
-from attrs import asdict, evolve, fields
+from attrs import asdict, fields
 
 from graspsense.core.components.roles import Controller
 from graspsense.core.components.run_config import RunConfig
@@ -107,7 +107,8 @@ class GraspProcess:
         trace = None
         if answer["bytes"]:
             events = (GraspEvent(t_s, Phase(phase), *told) for t_s, phase, *told in answer["events"])
-            trace = evolve(_read_trace(columns), events=tuple(events))
+            with np.load(columns, allow_pickle=False) as stored:
+                trace = Trace(**stored, events=tuple(events))
         return HandedGrasp(Outcome(answer["outcome"]), answer["reason"], trace, answer["further"])
 
 
@@ -150,8 +151,7 @@ def _answer(grasp: HandedGrasp, columns: IO[bytes]) -> dict[str, Any]:
     """Return a grasp as JSON values, and write the columns of its trace."""
     events: list[list[Any]] = []
     if grasp.trace is not None:
-        for name in COLUMNS:
-            np.lib.format.write_array(columns, getattr(grasp.trace, name), allow_pickle=False)
+        np.savez(columns, allow_pickle=False, **{name: getattr(grasp.trace, name) for name in COLUMNS})
         events = [[event.t_s, int(event.phase), event.what, event.source] for event in grasp.trace.events]
     return {
         "outcome": grasp.outcome.value,
@@ -190,8 +190,3 @@ def _read(stream: IO[bytes], n: int) -> bytes:
     if len(data) < n:
         raise EOFError("an answer is incomplete")
     return data
-
-
-def _read_trace(stream: IO[bytes]) -> Trace:
-    parts: dict[str, Any] = {name: np.lib.format.read_array(stream, allow_pickle=False) for name in COLUMNS}
-    return Trace(**parts)

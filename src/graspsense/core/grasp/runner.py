@@ -630,10 +630,10 @@ class _Grasp:
             self.last = last = reading.frame
             still = update_rest(still, last.t_s, last.gap_m, OPEN_SPEED_M_S, OPEN_WINDOW_S)
             unknown_s = 0.0 if self.protection is None else self.protection.opening.unknown_s(last.gap_m)
-            if at_rest(still, last.t_s, OPEN_WINDOW_S) and last.t_s - began_s >= unknown_s:
-                if self._is_open():
-                    return f"{OPENED} {last.gap_m * 1e3:.1f} mm"
-                break
+            rests = at_rest(still, last.t_s, OPEN_WINDOW_S) and last.t_s - began_s >= unknown_s
+            # A motor that has not heard the command may hear it later.
+            if rests and self._is_open():
+                return f"{OPENED} {last.gap_m * 1e3:.1f} mm"
             if last.t_s - began_s > run.opening_timeout_s:
                 break
         why = "" if answers else ": the gripper does not answer"

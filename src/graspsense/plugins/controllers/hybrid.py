@@ -110,7 +110,7 @@ def step(params: Any, state: HybridState, reading: Reading) -> tuple[Command, Hy
             force_effort = squeezing_effort(params, force_effort, frame)
         effort = force_effort
         elapsed = frame.t_s - contact_t
-        if elapsed < params.ramp_s:
+        if 0.0 <= elapsed < params.ramp_s:  # not where the clock of the gripper went back
             effort = approach_effort + (effort - approach_effort) * (elapsed / params.ramp_s)
         sent = raised(params, sent, frame.t_s, params.probing_force_n)
     command = Command(EFFORT, effort, inf, inf)

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-import struct
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Sequence
+from typing import Final
 
 from attrs import evolve
 
@@ -16,17 +15,21 @@ from graspsense.core.pipeline.pipeline import grasp_with
 from graspsense.core.settings.resolved import Settings
 from graspsense.core.values.errors import FAILURES
 from graspsense.core.values.features import Features
-from graspsense.core.values.signals import LABELLED, Reading
+from graspsense.core.values.signals import LABELLED, Command
 from graspsense.core.values.trace import Trace
 from graspsense.core.values.trial import Trial
 from graspsense.recording.labelled_recording import LabelledRecording
-from graspsense.recording.layout import DEVICE, RESULT, START, TICK, pads_numbers, pads_topic, signal_topics
+from graspsense.recording.layout import DEVICE, RESULT, START
 from graspsense.recording.recorded_grasp import with_phases_of
 from graspsense.recording.replayable import Recording, content_sha256
+from graspsense.recording.tick_messages import TickMessages
 from graspsense.recording.trial_record import TrialRecord
 from graspsense.recording.writer import RecordingWriter
 from graspsense.store.imported_contents import CONTENT, ImportedContents
 from graspsense.store.store import Store
+
+UNKNOWN: Final = Command(0, math.nan, math.nan, math.nan)
+"""The command of another program, which is not known."""
 
 
 def labels_of_recording(recording: LabelledRecording) -> dict[str, str]:
@@ -102,22 +105,10 @@ def _features(settings: Settings, trace: Trace, trial: Trial) -> Features:
 
 def _write_readings(file: RecordingWriter, recording: Recording, phases: Sequence[int]) -> None:
     """Write all readings, each with its phase."""
-    counter = 0
-    pads_number = -1
-    sources: list[tuple[int, struct.Struct, Callable[[Reading], tuple[Any, ...] | None]]] | None = None
+
+    def write(messages: bytes | memoryview) -> None:
+        file.messages(bytearray(messages))
+
+    ticks = TickMessages(write)
     for reading, phase in zip(recording.readings, phases, strict=True):
-        frame, pads, signals = reading
-        if pads.counter != counter:
-            counter = pads.counter
-            layout = pads_topic(len(pads.left))
-            if pads_number < 0:
-                pads_number = file.topic(layout)
-            file.signal(pads_number, layout.wire.pack(*pads_numbers(pads)))
-        if signals and sources is None:
-            sources = [(file.topic(topic), topic.wire, source) for topic, source in signal_topics(signals)]
-        for number, wire, source in sources or ():
-            numbers = source(reading)
-            if numbers is not None:
-                file.signal(number, wire.pack(*numbers))
-        # The commands of the other program are not known.
-        file.tick(TICK.pack(*frame, phase, 0, math.nan, math.nan, math.nan))
+        write(ticks.packed(reading, phase, UNKNOWN))

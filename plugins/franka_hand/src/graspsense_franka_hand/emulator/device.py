@@ -33,7 +33,7 @@ def emulate(config: object, wire: str, seed: int) -> EmulatedHand:
 
 
 @final
-class EmulatedHand(EmulatedSerial):
+class EmulatedHand(EmulatedSerial[FrankaHand]):
     """A hand behind port 1338 of an address of this machine. Unplugged, it keeps what it was told.
 
     A second host is refused. A host that goes away leaves the fingers as they are, as a real hand does.
@@ -49,8 +49,7 @@ class EmulatedHand(EmulatedSerial):
     }
 
     def __init__(self, config: FrankaConfig, seed: int) -> None:
-        super().__init__("network", config.faults)
-        self.hand = FrankaHand(config, seed)
+        super().__init__("network", config.faults, FrankaHand(config, seed))
         self._states = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._late_states: deque[tuple[float, bytes]] = deque()
         self._due_s = 0.0
@@ -71,7 +70,6 @@ class EmulatedHand(EmulatedSerial):
         """Unplug it and release the body."""
         super().close()
         self._states.close()
-        self.hand.close()
 
     def answer(self, data: bytes, now_s: float) -> bytes:
         """Return the replies to the requests that these bytes complete; bytes that are no request are forgotten."""
@@ -91,10 +89,6 @@ class EmulatedHand(EmulatedSerial):
                 self.hand.ask(request, now_s)
         return replies + self._ended()
 
-    def move(self, now_s: float) -> None:
-        """Move the fingers up to this time."""
-        self.hand.look(now_s)
-
     def unasked(self, now_s: float) -> bytes:
         """Send the states that are due, and return the replies to the commands that have ended."""
         mood = self._mood_at(now_s)
@@ -112,10 +106,6 @@ class EmulatedHand(EmulatedSerial):
                 self._states.sendto(self._late_states.popleft()[1], (LOCALHOST, self._state_port))
         return self._ended()
 
-    def active_s(self, now_s: float) -> float:
-        """Return for how long (s) it has been active, which it is from its start."""
-        return now_s
-
     def details(self) -> Mapping[str, float | int | str | bool]:
         """Return where it is reached, and the state of its fingers."""
         hand = self.hand
@@ -123,7 +113,6 @@ class EmulatedHand(EmulatedSerial):
             "host": self.where,
             "width_m": round(hand.width_m, 5),
             "grasped": hand.grasped,
-            "effort_n": round(hand.fingers.effort_n, 3),
             "pressing": hand.pressing,
             "refused_hosts": 0 if self._port is None else self._port.refused,
         }

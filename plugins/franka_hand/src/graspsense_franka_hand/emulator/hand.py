@@ -33,6 +33,7 @@ class FrankaHand:
 
     def __init__(self, config: FrankaConfig, seed: int) -> None:
         self.fingers = EmulatedFingers(config.body, config.body_config, config.object, seed, WIDEST_M)
+        self.active_since_s = 0.0
         self._target: FingerTarget | None = None
         self.widest_m = WIDEST_M
         self.grasped = False
@@ -98,10 +99,6 @@ class FrankaHand:
         """Return the commands that have ended since the last call, each with its status."""
         ended, self._ended = self._ended, []
         return ended
-
-    def close(self) -> None:
-        """Release the body."""
-        self.fingers.close()
 
     def _end(self, request: HandRequest, status: int) -> None:
         self._running = None

@@ -14,13 +14,12 @@ _COMMANDS = {orders.GRASP: protocol.GRASP, orders.MOVE: protocol.MOVE, orders.ST
 
 
 @final
-class LockStepHand(LockStepDevice):
+class LockStepHand(LockStepDevice[FrankaHand]):
     """An emulated hand of these settings. Raises HandGone if it gives no state, ConfigError for its body."""
 
     def __init__(self, config: FrankaConfig, seed: int) -> None:
         self._faults = config.faults
-        self.hand = FrankaHand(config, seed)
-        super().__init__(self.hand.fingers.body)
+        super().__init__(FrankaHand(config, seed))
         self._done = 0
         self._refused = ""
         try:
@@ -30,7 +29,7 @@ class LockStepHand(LockStepDevice):
             if state is None:
                 raise HandGone("no state came")
         except HandGone:
-            self.hand.close()
+            super().close()
             raise
         self.first = state
 
@@ -70,7 +69,7 @@ class LockStepHand(LockStepDevice):
     def close(self) -> None:
         """Stop the fingers, and release the body."""
         self.hand.ask(protocol.HandRequest(protocol.STOP, 0, ()), self._now_s)
-        self.hand.close()
+        super().close()
 
     def _check(self) -> None:
         if self._now_s >= self._faults.unplug_at_s:

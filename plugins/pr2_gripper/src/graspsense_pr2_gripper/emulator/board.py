@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import ClassVar, Final, final
 
@@ -14,6 +14,8 @@ from graspsense_pr2_gripper.config import Pr2Config
 from graspsense_pr2_gripper.emulation import emulated_board
 from graspsense_pr2_gripper.emulator.port import Plug, Port
 from graspsense_pr2_gripper.emulator.reasons import why_no_uhid, why_no_vhci
+from graspsense_pr2_gripper.emulator.uhid import UhidPort
+from graspsense_pr2_gripper.emulator.vhci import VhciPort
 from graspsense_pr2_gripper.protocol import FEATURE_ID, INPUT_LAYOUT, OUTPUT_ID
 from graspsense_pr2_gripper.transports.emulated import on_time
 
@@ -178,19 +180,7 @@ def nodes(serial: str) -> set[str]:
     return paths
 
 
-def _uhid(board: EmulatedBoard, plug: Plug) -> Port:
-    from graspsense_pr2_gripper.emulator.uhid import UhidPort
-
-    return UhidPort(board, plug)
-
-
-def _vhci(board: EmulatedBoard, plug: Plug) -> Port:
-    from graspsense_pr2_gripper.emulator.vhci import VhciPort
-
-    return VhciPort(board, plug)
-
-
-_PORTS: Final = {"uhid": _uhid, "usb": _vhci}
+_PORTS: Final[Mapping[str, Callable[[EmulatedBoard, Plug], Port]]] = {"uhid": UhidPort, "usb": VhciPort}
 _WHY_NOT: Final = {"uhid": why_no_uhid, "usb": why_no_vhci}
 
 

@@ -12,7 +12,7 @@ from typing import Final, final
 
 from graspsense.plugin_api import NoDevice
 from graspsense_pr2_gripper.emulator.port import Device, Plug, Port
-from graspsense_pr2_gripper.emulator.reasons import VHCI, why_no_vhci
+from graspsense_pr2_gripper.emulator.reasons import VHCI
 from graspsense_pr2_gripper.emulator.usbip import UsbipServer
 
 _DEVICE_ID: Final = 1 << 16 | 2
@@ -23,12 +23,9 @@ _FREE_PORT: Final = "004"
 
 @final
 class VhciPort(Port):
-    """Raises NoDevice with a remedy if vhci-hcd cannot be used."""
+    """A port through vhci-hcd, which `why_no_vhci` says can be used."""
 
     def __init__(self, device: Device, plug: Plug) -> None:
-        reason = why_no_vhci()
-        if reason:
-            raise NoDevice(reason)
         self._server = UsbipServer(device, plug)
         self._lock = threading.Lock()
         self._thread: threading.Thread | None = None

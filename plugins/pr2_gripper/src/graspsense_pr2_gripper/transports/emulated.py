@@ -17,7 +17,6 @@ QUEUE: Final = 64
 """Largest number of queued reports; newer ones are lost, as with a Linux hidraw node."""
 
 
-@final
 class LockStepTransport(Transport):
     """Device time advances by one period whenever a read finds no queued report, and at no other time."""
 
@@ -53,13 +52,11 @@ class LockStepTransport(Transport):
 
 
 @final
-class PacedTransport(Transport):
+class PacedTransport(LockStepTransport):
     """The board runs in its own thread, on a grid of absolute times."""
 
     def __init__(self, wire: Wire) -> None:
-        self._wire = wire
-        self._period_s = 1.0 / wire.firmware.identity.report_rate_hz
-        self._waiting: deque[bytes] = deque()
+        super().__init__(wire)
         self._arrived = threading.Condition()
         self._stop = False
         self._failed = ""
@@ -82,10 +79,6 @@ class PacedTransport(Transport):
             if self._gone():
                 raise TransportGone(self._failed or _GONE)
             self._wire.output(report)
-
-    def feature(self, report_id: int) -> bytes:
-        """Return the feature report of the board."""
-        return self._wire.feature()
 
     def close(self) -> None:
         """Stop the thread of the board."""

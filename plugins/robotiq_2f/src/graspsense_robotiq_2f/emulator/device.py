@@ -25,19 +25,18 @@ def emulate(config: object, wire: str, seed: int) -> EmulatedGripper:
 
 
 @final
-class EmulatedGripper(EmulatedSerial):
+class EmulatedGripper(EmulatedSerial[Hand]):
     """A hand behind a port, and fingertips behind one or two of their own. Unplugged, it keeps what it was asked."""
 
     rate_hz = RATE_HZ
 
     def __init__(self, config: RobotiqConfig, wire: str, seed: int) -> None:
-        super().__init__(wire, config.faults)
+        super().__init__(wire, config.faults, Hand(config, seed))
         self._config = config
-        self._hand = Hand(config, seed)
         self._data = b""
         count = config.tactile_ports.count("emulated")
         # Felt without the lock: who unplugs may hold it, and waits for the thread that asks what is felt.
-        self._boards = emulated_boards(count, lambda: self._hand.fingers.forces_n, seed=seed)
+        self._boards = emulated_boards(count, lambda: self.hand.fingers.forces_n, seed=seed)
         self._tactile_ports: list[EmulatedPort] = []
 
     @property
@@ -60,7 +59,7 @@ class EmulatedGripper(EmulatedSerial):
         """Execute one of `words`. Raises KeyError for any other."""
         if word == RESTART:
             with self._lock:
-                self._hand.power_up()
+                self.hand.power_up()
             return
         super().tell(word)
         if word == "plug" and not self._tactile_ports:
@@ -72,34 +71,15 @@ class EmulatedGripper(EmulatedSerial):
             for port in ports:
                 port.close()
 
-    def close(self) -> None:
-        """Unplug it and release the body."""
-        super().close()
-        self._hand.close()
-
     def answer(self, data: bytes, now_s: float) -> bytes:
         """Return the reply to a request that these bytes complete."""
         data = self._data + data if data else b""
         if self.wire == "ur":
-            reply, self._data = answered_by_ur_cap(self._hand, data, now_s)
+            reply, self._data = answered_by_ur_cap(self.hand, data, now_s)
         else:
-            reply, self._data = answered(self._hand, self._config.address, data, now_s)
+            reply, self._data = answered(self.hand, self._config.address, data, now_s)
         return reply
 
-    def move(self, now_s: float) -> None:
-        """Move the fingers up to this time."""
-        self._hand.look(now_s)
-
-    def active_s(self, now_s: float) -> float:
-        """Return for how long (s) it has been active."""
-        return now_s - self._hand.active_since_s
-
     def details(self) -> Mapping[str, float | int | str | bool]:
-        """Return the state of the fingers, and the port of the fingertips."""
-        fingers = self._hand.fingers
-        return {
-            "tactile_port": self.tactile_where,
-            "gap_m": round(fingers.gap_m, 5),
-            "effort_n": round(fingers.effort_n, 3),
-            "going": self._hand.going,
-        }
+        """Return whether the fingers go to a target, and the port of the fingertips."""
+        return {"tactile_port": self.tactile_where, "going": self.hand.going}

@@ -94,10 +94,6 @@ class Hand:
         amperes = min(round(abs(fingers.effort_n) / NEWTONS_PER_AMPERE / AMPERES_A_STEP), 255)
         return [status << 8, request.position, model.position(fingers.gap_m) << 8 | amperes]
 
-    def close(self) -> None:
-        """Release the body."""
-        self.fingers.close()
-
     def _objects(self, target_m: float) -> int:
         way_m = self.fingers.gap_m - target_m
         if not self.going:

@@ -20,25 +20,24 @@ STEP_S: Final = 0.001
 
 
 @final
-class LockStepGripper(LockStepDevice):
+class LockStepGripper(LockStepDevice[Hand]):
     """A gripper of these settings, as the link to it and as the clock. Raises ConfigError for an unfit body."""
 
     def __init__(self, config: RobotiqConfig, seed: int) -> None:
         self._config = config
-        self._hand = Hand(config, seed)
-        super().__init__(self._hand.fingers.body)
+        super().__init__(Hand(config, seed))
         count = config.tactile_ports.count("emulated")
-        self._boards = emulated_boards(count, lambda: self._hand.fingers.forces_n, self.monotonic, seed)
+        self._boards = emulated_boards(count, lambda: self.hand.fingers.forces_n, self.monotonic, seed)
 
     @property
     def stroke_m(self) -> float:
         """How wide it opens (m): not wider than its body."""
-        return self._hand.fingers.stroke_m
+        return self.hand.fingers.stroke_m
 
     def exchange(self, values: Sequence[int]) -> list[int]:
         """Write the output registers and return the input registers. Raises NoReply, OSError."""
         self._check_plug()
-        self._hand.write(OUTPUT, list(values), self._now_s)
+        self.hand.write(OUTPUT, list(values), self._now_s)
         return self.status()
 
     def status(self) -> list[int]:
@@ -46,17 +45,13 @@ class LockStepGripper(LockStepDevice):
         self._check_plug()
         self.sleep(EXCHANGE_S)
         faults = self._config.faults
-        mood = faults.mood_at(self._now_s - self._hand.active_since_s)
+        mood = faults.mood_at(self._now_s - self.hand.active_since_s)
         if mood == "late":
             self.sleep(min(faults.late_s, self._config.reply_timeout_s))
         if mood in ("silent", "damaged") or (mood == "late" and faults.late_s > self._config.reply_timeout_s):
             self.sleep(self._config.reply_timeout_s)
             raise NoReply("no reply, or a damaged one")
-        return self._hand.read(INPUT, COUNT, self._now_s)
-
-    def close(self) -> None:
-        """Release the body."""
-        self._hand.close()
+        return self.hand.read(INPUT, COUNT, self._now_s)
 
     def boards(self) -> list[LockStepBoard]:
         """Return the boards of its fingertips, which begin to send."""
@@ -65,13 +60,13 @@ class LockStepGripper(LockStepDevice):
         return [LockStepBoard(self, board) for board in self._boards]
 
     def _check_plug(self) -> None:
-        if self._now_s - self._hand.active_since_s >= self._config.faults.unplug_at_s:
+        if self._now_s - self.hand.active_since_s >= self._config.faults.unplug_at_s:
             raise OSError("the connection was lost")
 
     def feel(self) -> None:
         """Move the fingers on, so that the fingertips feel the present time."""
         self._check_plug()
-        self._hand.look(self._now_s)
+        self.hand.look(self._now_s)
 
 
 @final

@@ -5,6 +5,8 @@ from __future__ import annotations
 import struct
 from typing import Final
 
+from pymodbus.framer import FramerRTU
+
 from graspsense_robotiq_2f.emulator.hand import Hand
 
 READ: Final = (3, 4)
@@ -13,13 +15,8 @@ READ_AND_WRITE: Final = 23
 
 
 def checksum(data: bytes) -> bytes:
-    """Return the checksum of a frame, low byte first (polynomial 0xA001, from 0xFFFF)."""
-    value = 0xFFFF
-    for byte in data:
-        value ^= byte
-        for _ in range(8):
-            value = value >> 1 ^ 0xA001 if value & 1 else value >> 1
-    return struct.pack("<H", value)
+    """Return the checksum of a frame."""
+    return struct.pack(">H", FramerRTU.compute_CRC(data))
 
 
 def answered(hand: Hand, address: int, data: bytes, now_s: float) -> tuple[bytes, bytes]:

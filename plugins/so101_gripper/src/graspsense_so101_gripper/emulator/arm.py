@@ -27,22 +27,19 @@ def emulate(config: object, wire: str, seed: int) -> EmulatedArm:
 
 
 @final
-class EmulatedArm(EmulatedSerial):
+class EmulatedArm(EmulatedSerial[GripperMotor]):
     """Six motors on a bus. It is active from the first time that the gripper's motor has torque."""
 
     rate_hz = RATE_HZ
 
     def __init__(self, config: So101Config, wire: str, seed: int) -> None:
-        super().__init__(wire, config.faults)
-        self._gripper = GripperMotor(config, seed)
-        self.body = self._gripper.fingers.body
+        super().__init__(wire, config.faults, GripperMotor(config, seed))
         self._others = {
             number: EmulatedMotor(number, MODEL_NUMBER) for number in MOTORS if number != config.motor
         }
         # One of them holds the arm, as while another program has it.
         next(iter(self._others.values())).put("torque_enable", 1)
-        self._requests_of_bus = Requests({**self._others, config.motor: self._gripper})
-        self._active_since_s = inf
+        self._requests_of_bus = Requests({**self._others, config.motor: self.hand})
 
     @property
     def words(self) -> Mapping[str, str]:
@@ -56,45 +53,30 @@ class EmulatedArm(EmulatedSerial):
             return
         with self._lock:
             if word == "restart":
-                for motor in (self._gripper, *self._others.values()):
+                for motor in (self.hand, *self._others.values()):
                     motor.power_up()
             else:
-                limits = [self._gripper.number(f"{end}_position_limit") for end in ("min", "max")]
-                self._gripper.put("goal_position", sum(limits) // 2)
-
-    def close(self) -> None:
-        """Unplug it and release the body."""
-        super().close()
-        self._gripper.fingers.close()
+                limits = [self.hand.number(f"{end}_position_limit") for end in ("min", "max")]
+                self.hand.put("goal_position", sum(limits) // 2)
 
     def answer(self, data: bytes, now_s: float) -> bytes:
         """Return the replies to the requests that these bytes complete."""
         if not data:
             self._requests_of_bus.forget()
             return b""
-        self._gripper.look(now_s)
+        self.hand.look(now_s)
         reply = self._requests_of_bus.fed(data)
-        if self._active_since_s == inf and self._gripper.number("torque_enable"):
-            self._active_since_s = now_s
+        if self.hand.active_since_s == inf and self.hand.number("torque_enable"):
+            self.hand.active_since_s = now_s
         return reply
-
-    def move(self, now_s: float) -> None:
-        """Move the jaw up to this time."""
-        self._gripper.look(now_s)
-
-    def active_s(self, now_s: float) -> float:
-        """Return for how long (s) it has been active."""
-        return now_s - self._active_since_s
 
     def details(self) -> Mapping[str, float | int | str | bool]:
         """Return the state of the jaw, and how often motors other than the gripper's were written to."""
-        gripper = self._gripper
+        gripper = self.hand
         going = gripper.number("torque_enable") and abs(
             gripper.number("goal_position") - gripper.number("present_position")
         )
         return {
-            "gap_m": round(gripper.fingers.gap_m, 5),
-            "effort_n": round(gripper.fingers.effort_n, 3),
             "force_n": round(min(gripper.fingers.forces_n), 3),
             "steps_to_go": int(going),
             "torque": bool(gripper.number("torque_enable")),

@@ -7,13 +7,14 @@ from typing import Final, final
 from graspsense.gripper_api import LockStepDevice
 from graspsense_so101_gripper.config import So101Config
 from graspsense_so101_gripper.emulator.arm import EmulatedArm
+from graspsense_so101_gripper.emulator.motor import GripperMotor
 
 EXCHANGE_S: Final = 0.001
 """Time of a request and its reply: 0.5 ms on a bus of 1 Mbaud, and the rest for the converter."""
 
 
 @final
-class LockStepBus(LockStepDevice):
+class LockStepBus(LockStepDevice[GripperMotor]):
     """The bus of an arm with these settings, as a line for `ServoBus` and as the clock. Raises ConfigError for a body.
 
     What it sends are the packets of the bus, as on a serial port.
@@ -22,7 +23,7 @@ class LockStepBus(LockStepDevice):
     def __init__(self, config: So101Config, seed: int) -> None:
         self.is_using = False
         self.arm = EmulatedArm(config, "", seed)
-        super().__init__(self.arm.body)
+        super().__init__(self.arm.hand)
         self._timeout_s = config.reply_timeout_s
         self._until_s = self._due_s = 0.0
         self._coming: list[tuple[float, bytes]] = []
@@ -61,7 +62,3 @@ class LockStepBus(LockStepDevice):
     def isPacketTimeout(self) -> bool:  # noqa: N802
         """Return whether the time of the wait is over."""
         return self._now_s >= self._until_s
-
-    def close(self) -> None:
-        """Release the body."""
-        self.arm.close()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import inf
 from typing import Final
 
 from graspsense.gripper_api import EmulatedFingers, FingerTarget
@@ -83,6 +84,7 @@ class GripperMotor(EmulatedMotor):
         super().__init__(config.motor, config.faults.model_number)
         settings = {**(GEARS if config.body == "sim" else {}), **config.body_config}
         self.fingers = EmulatedFingers(config.body, settings, config.object, seed)
+        self.active_since_s = inf
         self._full_n = config.full_force_n
         self._stall_current_a = config.stall_current_a
         opened = opened_at(CLOSED, self.fingers.stroke_m, config.jaw_length_m)
