@@ -10,6 +10,7 @@ from test_conformal import model_of
 from test_evaluate import labelled, learner
 
 from graspsense.core.components.registry import installed
+from graspsense.core.learn.clumps import mean_ranks
 from graspsense.core.learn.copies import without_copies
 from graspsense.core.learn.groups import grouped
 from graspsense.core.learn.model_file import load_model, write_model
@@ -70,6 +71,14 @@ def test_copies_with_other_digits_are_in_one_group_and_other_trials_are_not():
     assert trials.grouped
     assert len(set(trials.instances)) > 40, "45 grasps were pasted; a few lie close together by chance"
     assert len(pairs) == 45, "both copies of a grasp are in one group"
+
+
+def test_ranks_are_those_of_scipy():
+    from scipy.stats import rankdata
+
+    values = np.random.default_rng(0).integers(0, 9, (40, 5)).astype(float)
+    values[3, 1:3] = np.nan
+    np.testing.assert_array_equal(mean_ranks(values), rankdata(values, axis=0, nan_policy="omit"))
 
 
 def test_near_copies_join_the_named_instances_that_they_are_of():

@@ -332,7 +332,7 @@ def test_an_acceleration_of_one_axis_is_told_and_its_threshold_can_be_set(tmp_pa
     [
         (("--events", "--png", "x.png"), 2, "--png"),
         (("--events", "--tolerance", "0"), 2, "tolerance"),
-        (("--events", "--tolerance", "nan"), 2, "nan is no"),
+        (("--events", "--tolerance", "nan"), 2, "above 0, at most 60"),
         (("--events", "--instance", "box"), 2, "--instance"),
         (("--events", "--only", "jar"), 2, "0 recordings"),
         (("--events", "-o", "controller.type=grab"), 2, "no such channel"),

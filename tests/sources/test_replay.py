@@ -187,7 +187,7 @@ def test_folder_may_be_the_one_that_contains_the_data_set(tmp_path: Path) -> Non
     for folder in (inside, tmp_path):
         assert read_recording(f"{folder}/full_bottle_1.txt").name == "iCub hand, full_bottle_1.txt"
     for place, says in (
-        (f"{tmp_path}/ful_bottle_1.txt", r"among 1 grasp.*Did you mean 'full_bottle_1.txt'\?"),
+        (f"{tmp_path}/ful_bottle_1.txt", r"no grasp.*Did you mean 'full_bottle_1.txt'\?"),
         (str(tmp_path), "is a folder: name a grasp in it"),
     ):
         with pytest.raises(ConfigError, match=says):

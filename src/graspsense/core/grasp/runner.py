@@ -157,8 +157,7 @@ def run_grasp(
                 on_open(info)
             grasp = _Grasp(backend, controller, run, info, sinks, on_event, interrupts)
             if watcher is not None:
-                grasp.watcher = watcher
-                watcher.begin(grasp.recorder, info, grasp.predicted)
+                grasp.watch_with(watcher)
             with no_collection():
                 outcome, reason = grasp.drive()
         except BaseException:
@@ -290,6 +289,11 @@ class _Grasp:
         return Protection(
             self.info, self.controller, self.run, self._fault_seen, self.backend.command_delay_s
         )
+
+    def watch_with(self, watcher: Watcher) -> None:
+        """Let this watcher see the ticks from the contact on."""
+        self.watcher = watcher
+        watcher.begin(self.recorder, self.info, self._predicted)
 
     def _show_device(self) -> None:
         """Tell the sinks of the gripper."""
@@ -572,7 +576,7 @@ class _Grasp:
             self.state = state = stopped(self.params.schedule, state, frame)
         return state
 
-    def predicted(self, t_s: float, phase: int, what: str, prediction: Prediction | None) -> None:
+    def _predicted(self, t_s: float, phase: int, what: str, prediction: Prediction | None) -> None:
         """Log a prediction that was made while the grasp goes on."""
         self._event(t_s, Phase(phase), what, "model", prediction)
 

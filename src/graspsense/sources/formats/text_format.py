@@ -37,7 +37,6 @@ from graspsense.sources.formats.text_table import (
     table_of,
     unit_in,
 )
-from graspsense.sources.units import UNITS
 
 _Part = tuple[dict[str, str], Sequence[Line]]
 
