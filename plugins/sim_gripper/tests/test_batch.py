@@ -212,7 +212,8 @@ def test_a_batch_ends_when_it_is_interrupted():
         assert running.stdout.readline() == "running\n"
         os.killpg(running.pid, signal.SIGINT)
         said, errors = running.communicate()
-    assert (said.splitlines()[-1], errors) == ("interrupted", "")
+    # The interrupt can come between the text and the end of a line that says "running".
+    assert (said.endswith("interrupted\n"), errors) == (True, "")
 
 
 @slow_compiled
