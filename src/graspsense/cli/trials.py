@@ -124,7 +124,7 @@ def aside(refs: Sequence[str], why: str) -> None:
 @_JSON
 def restore(refs: Sequence[str], why: str) -> None:
     """Bring trials back that were set aside."""
-    _change(refs, lambda store, numbers: changes.set_aside(store, numbers, why, aside=False))
+    _change(refs, lambda store, numbers: changes.restore(store, numbers, why))
 
 
 @trials.command("history")

@@ -72,18 +72,31 @@ def history(store: Store, number: int | None = None) -> list[Change]:
     return [Change(*row) for row in rows]
 
 
-def set_aside(store: Store, numbers: Sequence[int], why: str, *, aside: bool = True) -> None:
-    """Set trials aside, so that they stay in the store but are neither counted nor learned from, or bring them back.
+def set_aside(store: Store, numbers: Sequence[int], why: str) -> None:
+    """Set trials aside: they stay in the store, but are neither counted nor learned from.
 
-    Raises ConfigError, before anything is changed, if a trial does not exist or is in that state already; SaveFailed.
+    Raises ConfigError, before anything is changed, if a trial does not exist or is set aside already; SaveFailed.
     """
+    _set_state(store, numbers, "aside", why)
+
+
+def restore(store: Store, numbers: Sequence[int], why: str) -> None:
+    """Bring trials back that were set aside.
+
+    Raises ConfigError, before anything is changed, if a trial does not exist or is not set aside; SaveFailed.
+    """
+    _set_state(store, numbers, "restore", why)
+
+
+def _set_state(store: Store, numbers: Sequence[int], action: Action, why: str) -> None:
+    aside = action == "aside"
 
     def change(connection: sqlite3.Connection, trial: TrialSummary) -> None:
         if (trial.set_aside is not None) == aside:
             state = f"is set aside already: {trial.set_aside}" if aside else "is not set aside"
             raise ConfigError(f"trial {trial.id} {state}")
         connection.execute("UPDATE trial SET set_aside = ? WHERE id = ?", (why if aside else None, trial.id))
-        _keep(connection, trial.id, "aside" if aside else "restore", None, None, why)
+        _keep(connection, trial.id, action, None, None, why)
 
     _for_each(store, numbers, change)
 
