@@ -19,6 +19,7 @@ from graspsense.cli.options import (
     settings_of,
 )
 from graspsense.cli.output import echo_values, json_option
+from graspsense.cli.recover import tell_recovered
 from graspsense.cli.terminal import Style, echo_as_it_is, echo_entry, talk
 from graspsense.core.components.registry import installed
 from graspsense.core.files.whole_file import SaveFailed
@@ -208,11 +209,7 @@ def _prepare(store: Store, values: tuple[str, ...]) -> None:
     """Complete the trials of an interrupted run, and print what became of each. Raises ConfigError for other units."""
     from graspsense.store.recover import recover_store
 
-    for recovered in recover_store(store):
-        number = f" as trial {recovered.trial}" if recovered.trial is not None else ""
-        talk(
-            f"{recovered.file.name}: {recovered.what}{number}{f' ({recovered.why})' if recovered.why else ''}"
-        )
+    tell_recovered(recover_store(store))
     refuse_other_units(store, [value_label(text)[0] for text in values])
 
 

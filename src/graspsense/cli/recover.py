@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -12,6 +14,17 @@ from graspsense.cli.sources import named_store
 from graspsense.cli.terminal import Style, echo, echo_entries, talk
 from graspsense.core.values.errors import ExitCode, counted
 from graspsense.store.opening import RECORDINGS
+
+if TYPE_CHECKING:
+    from graspsense.store.recover import Recovered
+
+
+def tell_recovered(files: Sequence[Recovered]) -> None:
+    """Print what became of each file of an interrupted run, before the store is written to again."""
+    for recovered in files:
+        number = f" as trial {recovered.trial}" if recovered.trial is not None else ""
+        why = f" ({recovered.why})" if recovered.why else ""
+        talk(f"{recovered.file.name}: {recovered.what}{number}{why}")
 
 
 @click.command()

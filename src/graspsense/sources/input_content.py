@@ -32,8 +32,10 @@ from graspsense.store.opening import STORE, as_source, place_and_number
 FRAMEWORK: Final = "graspsense"
 _OWN_PLUGINS: Final = "graspsense.plugins"
 _CALIBRATION: Final = "calibration"
-_OF_TRIALS: Final = """SELECT id, recording, recording_bytes, sha256, label, instance, set_aside, hex("values")
+_OF_TRIALS: Final = """SELECT id, recording, recording_bytes, sha256, label, instance, set_aside IS NULL, hex("values")
     FROM trial JOIN detail ON detail.trial = id ORDER BY id"""
+_OF_CHANGES: Final = """SELECT trial, "action", "before", "after" FROM change
+    WHERE "action" NOT IN ('aside', 'restore') ORDER BY id"""
 _REQUIREMENT: Final = re.compile(r"([\w.-]+)(?!.*\bextra\b)")
 _IMPORTED: Final = re.compile(
     r"^[ \t]*from[ \t]+(\w[\w.]*)|^[ \t]*import[ \t]+([\w., \t]+)|(?:import_module|__import__)\(\s*[\"'](\w[\w.]*)",
@@ -242,7 +244,7 @@ def _is_developed(place: str) -> bool:
 
 
 def _hash_of_store(folder: str) -> str:
-    """Return a hash of the trials of a store, of all changes of them, and of recordings that are lost or were replaced.
+    """Return a hash of the trials of a store, of changes of their labels, and of recordings that are lost or replaced.
 
     A recording is known by its size: to read all of them takes as long as to evaluate them.
     """
@@ -251,7 +253,7 @@ def _hash_of_store(folder: str) -> str:
     try:
         with Store.read(folder) as store:
             trials = store.query(_OF_TRIALS)
-            changes = store.query('SELECT trial, "action", "before", "after" FROM change ORDER BY id')
+            changes = store.query(_OF_CHANGES)
             sizes = [_bytes_of(store.recording_path(name)) for _, name, *_ in trials]
             lost = [[*row[:2], size] for row, size in zip(trials, sizes, strict=True) if size != row[2]]
     except GraspsenseError as error:
