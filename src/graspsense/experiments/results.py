@@ -31,7 +31,7 @@ from graspsense.core.settings.settings_file import to_toml
 from graspsense.core.values.errors import ConfigError, named
 from graspsense.evaluation.json_codec import from_json
 from graspsense.experiments.experiment import PipelineOf, Planned
-from graspsense.experiments.experiment_file import read_experiment
+from graspsense.experiments.experiment_file import read_plan
 from graspsense.experiments.task import Task, TaskResult
 from graspsense.experiments.versions import versions
 from graspsense.recording.provenance import process_provenance
@@ -123,7 +123,7 @@ class Results:
 
     def experiment(self) -> Planned:
         """Return the experiment of the folder, under the name that it was run by. Raises ConfigError."""
-        planned = read_experiment(str(self.folder / EXPERIMENT), force=True)
+        planned = read_plan(str(self.folder / EXPERIMENT), force=True)
         provenance = self.provenance()
         # The results are those of the inputs that there were. Without them, an earlier version made the results.
         inputs = provenance.get("inputs") or {}
