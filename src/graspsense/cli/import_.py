@@ -17,7 +17,6 @@ from graspsense.cli.import_check import echo_channels, show_files, suggest_manif
 from graspsense.cli.options import keys_option, pipeline_option, refuse_typed
 from graspsense.cli.output import echo_values, file_to_write, json_option
 from graspsense.cli.progress import ProgressLine
-from graspsense.cli.recover import tell_recovered
 from graspsense.cli.run import draw_grasp
 from graspsense.cli.sources import named_source
 from graspsense.cli.terminal import (
@@ -311,16 +310,16 @@ def _store(
     """Store the recordings that the store does not have. Raises SaveFailed."""
     from graspsense.sources.importing.import_recording import import_recording
     from graspsense.sources.recordings.dataset_recordings import handed_over
-    from graspsense.store.imported_contents import AlreadyImported, imported_alone
+    from graspsense.store.imported_contents import AlreadyImported, ImportedContents, imported_alone
+    from graspsense.store.recover import recover_store
     from graspsense.store.store import Store
 
     stored = _Stored([], [], [])
     waiting = partial(talk, f"waiting for another import into {save}")
-    with (
-        Store.open(save) as store,
-        ProgressLine() as progress,
-        imported_alone(store, waiting, tell_recovered) as contents,
-    ):
+    with Store.open(save) as store, imported_alone(store, waiting), ProgressLine() as progress:
+        for left in recover_store(store):  # by a killed import, which is not imported again
+            talk(left.words)
+        contents = ImportedContents(store)
         for done, recording in enumerate(recordings):
             source = recording.labelled.source
             with handed_over(recording.name, recording.labelled.recording):

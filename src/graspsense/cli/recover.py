@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
@@ -14,17 +12,6 @@ from graspsense.cli.sources import named_store
 from graspsense.cli.terminal import Style, echo, echo_entries, talk
 from graspsense.core.values.errors import ExitCode, counted
 from graspsense.store.opening import RECORDINGS
-
-if TYPE_CHECKING:
-    from graspsense.store.recover import Recovered
-
-
-def tell_recovered(files: Sequence[Recovered]) -> None:
-    """Print what became of each file of an interrupted run, before the store is written to again."""
-    for recovered in files:
-        number = f" as trial {recovered.trial}" if recovered.trial is not None else ""
-        why = f" ({recovered.why})" if recovered.why else ""
-        talk(f"{recovered.file.name}: {recovered.what}{number}{why}")
 
 
 @click.command()
@@ -57,12 +44,7 @@ def recover(source: str, out: str | None) -> None:
         recovered = [recover_file(source, out)]
     echo_values({"files": [trial.as_json() for trial in recovered]})
     for trial in recovered:
-        where = f" as trial {trial.trial}" if trial.trial is not None else f" in {trial.recording}"
-        why = f": {trial.why}" if trial.why else ""
-        echo(
-            f"{trial.file.name}: {trial.what}{where if trial.recording else ''}, {trial.ticks} ticks{why}",
-            indent=2,
-        )
+        echo(trial.words, indent=2)
     if not recovered:
         echo("nothing to recover")
     if any(trial.what == "failed" for trial in recovered):

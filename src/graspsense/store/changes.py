@@ -16,7 +16,6 @@ from attrs import astuple, evolve, frozen
 
 from graspsense.core.learn.target_value import name_and_unit
 from graspsense.core.values.errors import ConfigError
-from graspsense.store.imported_contents import refuse_restored
 from graspsense.store.labels import word_of
 from graspsense.store.opening import damaged, decoded
 
@@ -84,10 +83,8 @@ def set_aside(store: Store, numbers: Sequence[int], why: str) -> None:
 def restore(store: Store, numbers: Sequence[int], why: str) -> None:
     """Bring trials back that were set aside.
 
-    Raises ConfigError, before anything is changed, if a trial does not exist, is not set aside, or was imported again
-    in the meantime; SaveFailed.
+    Raises ConfigError, before anything is changed, if a trial does not exist or is not set aside; SaveFailed.
     """
-    refuse_restored(store, numbers)
     _set_state(store, numbers, "restore", why)
 
 

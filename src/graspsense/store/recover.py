@@ -53,6 +53,13 @@ class Recovered:
     ticks: int = 0
     why: str = ""
 
+    @property
+    def words(self) -> str:
+        """What was done, in one line."""
+        where = f" as trial {self.trial}" if self.trial is not None else f" in {self.recording}"
+        why = f": {self.why}" if self.why else ""
+        return f"{self.file.name}: {self.what}{where if self.recording else ''}, {self.ticks} ticks{why}"
+
     def as_json(self) -> dict[str, Any]:
         """Return the fields as JSON values."""
         return asdict(
@@ -108,14 +115,21 @@ def recover_file(path: str | Path, out: str | Path | None = None) -> Recovered:
         if not len(grasp):
             raise DataDamaged(f"no tick can be read from {path}: {grasp.damage or 'it has none'}")
         target = Path(os.path.expanduser(out)) if out else _beside(path)
-        with _writing(target):
-            write_copy(grasp, target)
+        write_copy(grasp, target)
     return Recovered(file=path, what="recovered", recording=target, ticks=len(grasp), why=_why(grasp))
 
 
 def write_copy(grasp: RecordedGrasp, path: Path) -> RecordingInfo:
-    """Write a recorded grasp as a new, complete recording. Raises OSError."""
-    file = RecordingWriter(path, grasp.base_ns)
+    """Write a recorded grasp as a new, complete recording. Raises SaveFailed."""
+    try:
+        return _copied(grasp, RecordingWriter(path, grasp.base_ns))
+    except FileExistsError as error:
+        raise SaveFailed(f"{path} already exists: name another file, or move it away") from error
+    except OSError as error:
+        raise SaveFailed(f"{path} cannot be written: {error.strerror}") from error
+
+
+def _copied(grasp: RecordedGrasp, file: RecordingWriter) -> RecordingInfo:
     try:
         for name in (START, DEVICE):
             if name in grasp.metadata:
@@ -165,8 +179,7 @@ def _complete(store: Store, part: Path) -> Recovered:
             part.rename(path)
             return evolve(_add_row(store, path), file=part)
         if not copy.exists():
-            with _writing(copy):
-                write_copy(grasp, copy)
+            write_copy(grasp, copy)
         result = _add_row(store, copy)
         if result.trial is not None:
             part.rename(part.with_name(path.name + CUT))
@@ -255,13 +268,3 @@ def _locked(path: Path) -> Iterator[bool | None]:
         raise ConfigError(f"the recording {path} cannot be read: {error.strerror}") from error
     with file:
         yield locked(file.fileno())
-
-
-@contextmanager
-def _writing(path: Path) -> Iterator[None]:
-    try:
-        yield
-    except FileExistsError as error:
-        raise SaveFailed(f"{path} already exists: name another file, or move it away") from error
-    except OSError as error:
-        raise SaveFailed(f"{path} cannot be written: {error.strerror}") from error
