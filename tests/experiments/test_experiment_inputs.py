@@ -27,7 +27,7 @@ from graspsense.experiments.task import TaskResult, run_task
 from graspsense.plugin_api import hookimpl
 from graspsense.sources import input_content
 from graspsense.sources.input_content import contents_of
-from graspsense.store.changes import set_aside
+from graspsense.store.changes import restore, set_aside
 from graspsense.store.store import Store
 
 EXPERIMENT = """
@@ -205,6 +205,9 @@ def test_a_store_that_grew_or_was_corrected_is_another_input(tmp_path):
         set_aside(store, [3], "slipped")
         assert run_experiment(read_experiment(file), results, Serial, resume=True).done == 1
         assert rate_of(read_experiment(file), results)[1] == 23
+        restore(store, [3], "")
+        set_aside(store, [3], "slipped, as the film shows")
+        assert run_experiment(read_experiment(file), results, Serial, resume=True).kept == 1
 
         names = [f"store:{tmp_path}/s", f"store:{tmp_path}/s#3"]  # the store, and one of its trials
         recording = next(store.recordings.glob("*.mcap"))

@@ -403,7 +403,12 @@ def test_any_json_instead_of_provenance_or_of_a_result_is_told_in_words(whole, t
     (results.folder / "provenance.json").write_text(content)
     assert results.provenance() == {}
     task = planned.tasks()[0]
-    results.path(task.key).write_text(content)
+    path = results.path(task.key)
+    path.unlink()
+    os.mkfifo(path)  # opening it would wait without end
+    assert "pipe" in results.read(task)[1]
+    path.unlink()
+    path.write_text(content)
     assert "damaged" in results.read(task)[1]
     write_page(summarise(planned, results), results)
     account = run_experiment(planned, results, Serial, resume=True)
