@@ -321,12 +321,7 @@ def test_no_part_of_a_result_is_taken_for_one(end):
     assert TaskResult.from_text(text).made.seconds == 1.5
     with pytest.raises(ValueError):
         TaskResult.from_text(text[: end % len(text)])
-
-
-def test_a_result_with_a_changed_digit_is_not_read():
-    """A rate that was edited, or damaged on the disk, is valid JSON; only the hash tells."""
-    text = TaskResult(key="k", name="n", result={"rate": 0.5}).to_text()
-    with pytest.raises(ValueError, match="sha256"):
+    with pytest.raises(ValueError, match="sha256"):  # edited, or damaged on the disk, it is valid JSON
         TaskResult.from_text(text.replace("0.5", "0.6"))
 
 
@@ -615,17 +610,6 @@ def test_each_case_is_compared_with_that_of_the_same_name(whole, tmp_path):
         assert difference["verdict"] == "not shown to differ"
 
 
-def test_a_report_of_results_with_other_settings_says_what_happened_and_what_to_do(strong, tmp_path):
-    changed = tmp_path / "changed"
-    shutil.copytree(strong, changed)
-    text = (changed / "experiment.toml").read_text()
-    (changed / "experiment.toml").write_text(text.replace("folds = 3", "folds = 4"))
-    err = refused("report", changed)
-    assert "has results" in err
-    assert f"graspsense experiment {changed / 'experiment.toml'} --out FOLDER" in err
-    assert not (changed / "report.html").exists()
-
-
 def test_what_cannot_be_compared_is_refused_in_one_line(weak, strong, tmp_path):
     page = tmp_path / "c.html"
     old, changed = tmp_path / "old", tmp_path / "changed"
@@ -650,6 +634,7 @@ def test_what_cannot_be_compared_is_refused_in_one_line(weak, strong, tmp_path):
         assert reason in err
         assert len(err.strip().splitlines()) == 1, err
         assert not page.exists()
+    assert f"graspsense experiment {changed / 'experiment.toml'} --out FOLDER" in refused("report", changed)
 
 
 def test_the_page_of_an_experiment_keeps_its_name_when_it_is_written_again(weak):
