@@ -118,7 +118,7 @@ def test_two_tables_that_are_exchanged_are_another_task(tmp_path):
     assert task.key != exchanged.key
 
 
-def test_results_of_other_versions_are_told_wherever_they_are_shown(tmp_path):
+def test_results_of_other_versions_are_told_and_those_of_an_older_form_computed_again(tmp_path):
     table(tmp_path / "t.csv", 1, 50.0)
     planned = read_experiment(experiment(tmp_path, "t.csv"), ["seeds=2"])
     results = Results(tmp_path / "out")
@@ -134,18 +134,10 @@ def test_results_of_other_versions_are_told_wherever_they_are_shown(tmp_path):
     assert number == 1
     assert how in summary.as_json()["other_versions"]
     assert escape(how) in write_page(summary, results).read_text()
-
-
-def test_a_result_of_an_older_form_is_computed_again(tmp_path):
-    table(tmp_path / "t.csv", 1, 50.0)
-    planned = read_experiment(experiment(tmp_path, "t.csv"))
-    results = Results(tmp_path / "out")
-    run_experiment(planned, results, Serial)
-    done, _ = results.read(planned.tasks()[0])
     results.add(evolve(done, result={key: value for key, value in done.result.items() if key != "simulated"}))
     assert len(summarise(planned, results).unreadable) == 1
     account = run_experiment(planned, results, Serial, resume=True)
-    assert (account.kept, account.done) == (0, 1)
+    assert (account.kept, account.done) == (1, 1)
     assert rate_of(planned, results) == (1.0, 40)
 
 

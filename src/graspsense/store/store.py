@@ -200,12 +200,11 @@ class Store:
         _, row = self.encoded_row(number)
         try:
             return decoded(summary, row, self.recording_path(summary.recording))
-        except DataDamaged as error:
-            raise damaged(self.folder, str(error)) from error
         except MemoryError:
             raise
         except Exception as error:  # a row can hold any value in any place
-            raise damaged(self.folder, f"trial {number} cannot be read ({named(error)})") from error
+            unread = f"trial {number} cannot be read ({named(error)})"
+            raise damaged(self.folder, str(error) if isinstance(error, DataDamaged) else unread) from error
 
     def first_readable(self, numbers: Iterable[int]) -> StoredTrial:
         """Return the first of these trials that can be read; there is one. Raises DataDamaged if none can be."""
