@@ -331,12 +331,14 @@ LAW = """
 import helper
 from helpers.law import a
 weights = [Path(__file__).parents[2] / "data" / "weights.txt", "near.txt", os.environ["LAB_WEIGHTS"]]
-late = import_module("lab_late"), os.environ.get("LAB_SCALE")
+late = import_module("lab_late"), os.environ.get("lab_scale"), Path(__file__).parent / "../../data/more.txt"
 """
 
 
 def test_the_code_of_a_plugin_counts_with_what_it_imports_and_names(tmp_path, monkeypatch):
-    texts = dict.fromkeys(["src/helpers/law.py", "src/near.txt", "data/weights.txt", "far.txt"], "")
+    texts = dict.fromkeys(
+        ["src/helpers/law.py", "src/near.txt", "data/weights.txt", "data/more.txt", "far.txt"], ""
+    )
     texts |= {"src/my_plugin/law.py": LAW, "src/helper.py": "import lab_deep, attrs, lab_lost"}
     texts |= {"library/lab_late.py": "", "library/lab_deep/__init__.py": ""}
     for name, text in texts.items():
@@ -358,7 +360,7 @@ def test_the_code_of_a_plugin_counts_with_what_it_imports_and_names(tmp_path, mo
         (tmp_path / name).write_text(f"{text}\n# changed")
         assert content() not in known, name
         known.append(content())
-    monkeypatch.setenv("LAB_SCALE", "2")
+    monkeypatch.setenv("lab_scale", "2")
     assert content() not in known
     developed = input_content.developed_code("my_plugin.law")
     (tmp_path / "src" / "my_plugin" / "law.py").write_text("a = 333")

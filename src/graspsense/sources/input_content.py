@@ -41,7 +41,6 @@ _IMPORTED: Final = re.compile(
     r"^[ \t]*from[ \t]+(\w[\w.]*)|^[ \t]*import[ \t]+([\w., \t]+)|(?:import_module|__import__)\(\s*[\"'](\w[\w.]*)",
     re.MULTILINE,
 )
-_VARIABLE: Final = re.compile("[A-Z][A-Z0-9_]+")
 _QUOTED: Final = re.compile(r"\"[^\"\n]{1,1000}\"|'[^'\n]{1,1000}'")
 
 
@@ -166,10 +165,11 @@ def _hash_of_code(version: str, module: str) -> str:
         return version
     code = _code_of(package)
     texts = set[str]().union(*code.values())
-    variables = {text: os.environ.get(text, "") for text in texts if _VARIABLE.fullmatch(text)}
+    variables = {text: os.environ[text] for text in texts & os.environ.keys() if len(text) > 1}
     texts.update(variables.values())
-    developed = [os.path.dirname(place) for place in code if _is_developed(place)]
-    folders = {os.curdir, *developed, *map(os.path.dirname, developed)}
+    developed = [place for place in code if _is_developed(place)]
+    above = list(map(os.path.dirname, developed))
+    folders = {os.curdir, *developed, *above, *map(os.path.dirname, above)}
     files = _files_in(folders, {*texts, *(f"{text}.py" for text in texts)})
     named = sorted(files.union(*(_named_files(file, (), set()) for file in files)))
     values = [f"{name}={value}" for name, value in sorted(variables.items())]
