@@ -276,6 +276,8 @@ def test_identified_scenes_of_an_experiment_bring_their_fingertips(tmp_path):
 
 
 def test_options_are_laid_over_the_file(file):
+    with pytest.raises(ConfigError, match=r"judge\.folds.*: 1000 folds of 40 trials"):
+        read_experiment(str(file), ['sweep={"judge.folds"=[1000]}'])
     planned = read_experiment(str(file), ["seeds=[7]", "data.only=a", "controller.probing_force_n=17"])
 
     assert planned.seeds == (7,)
@@ -502,11 +504,6 @@ def test_an_experiment_does_not_write_into_a_store(file, tmp_path):
     assert graspsense("experiment", file, "--out", tmp_path / "trials", "--dry-run")[::2] == (2, err)
 
 
-def test_more_folds_than_recorded_trials_are_refused_before_any_task(file):
-    with pytest.raises(ConfigError, match=r"judge\.folds.*: 1000 folds of 40 trials"):
-        read_experiment(str(file), ['sweep={"judge.folds"=[1000]}'])
-
-
 COMPARED = """
 title = "A sweep"
 question = "Does it matter?"
@@ -612,6 +609,7 @@ def test_each_case_is_compared_with_that_of_the_same_name(whole, tmp_path):
 
 def test_what_cannot_be_compared_is_refused_in_one_line(weak, strong, tmp_path):
     page = tmp_path / "c.html"
+    assert Results(weak).experiment().name == "weak"  # which is not in its file
     old, changed = tmp_path / "old", tmp_path / "changed"
     for copy in (old, changed):
         shutil.copytree(strong, copy)
@@ -635,7 +633,3 @@ def test_what_cannot_be_compared_is_refused_in_one_line(weak, strong, tmp_path):
         assert len(err.strip().splitlines()) == 1, err
         assert not page.exists()
     assert f"graspsense experiment {changed / 'experiment.toml'} --out FOLDER" in refused("report", changed)
-
-
-def test_the_page_of_an_experiment_keeps_its_name_when_it_is_written_again(weak):
-    assert Results(weak).experiment().name == "weak"

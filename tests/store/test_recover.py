@@ -3,6 +3,7 @@
 import errno
 import json
 import shutil
+from unittest.mock import Mock
 
 import pytest
 from attrs import evolve
@@ -97,11 +98,8 @@ def test_a_recording_that_is_being_written_is_left_alone(store):
 
 
 def test_on_a_disk_without_locks_only_what_may_be_being_written_is_left_alone(store, monkeypatch):
-    def refused(file, operation):
-        raise OSError(errno.ENOLCK, "No locks available")
-
     path = part(store)
-    monkeypatch.setattr("fcntl.flock", refused)
+    monkeypatch.setattr("fcntl.flock", Mock(side_effect=OSError(errno.ENOLCK, "No locks available")))
     keep(store)
     (recovery,) = recover_store(store)
     assert (recovery.what, path.exists(), "locks" in recovery.why) == ("busy", True, True)
