@@ -27,7 +27,7 @@ from graspsense.experiments.task import TaskResult, run_task
 from graspsense.plugin_api import hookimpl
 from graspsense.sources import input_content
 from graspsense.sources.input_content import contents_of
-from graspsense.store.changes import set_aside
+from graspsense.store.changes import restore, set_aside
 from graspsense.store.store import Store
 
 EXPERIMENT = """
@@ -68,20 +68,13 @@ def test_a_replaced_table_is_evaluated_anew_and_it_is_said(tmp_path):
     assert rate_of(read_experiment(file), results) == (1.0, 40)
 
     table(tmp_path / "t.csv", 2, 0.0)
+    assert rate_of(results.experiment(), results) == (1.0, 40)  # a page is that of what there was
     account = run_experiment(read_experiment(file), results, Serial, resume=True)
     assert (account.kept, account.done) == (0, 1)
     assert any("t.csv" in note for note in account.notes)
     assert rate_of(read_experiment(file), results)[0] < 0.9
     again = run_experiment(read_experiment(file), results, Serial, resume=True)
     assert (again.kept, again.done, again.notes) == (1, 0, ())
-
-
-def test_the_page_of_results_is_that_of_the_content_that_they_were_made_from(tmp_path):
-    table(tmp_path / "t.csv", 1, 50.0)
-    results = Results(tmp_path / "out")
-    run_experiment(read_experiment(experiment(tmp_path, "t.csv")), results, Serial)
-    table(tmp_path / "t.csv", 2, 0.0)
-    assert rate_of(results.experiment(), results) == (1.0, 40)
 
 
 def test_results_keep_their_task_where_data_move_and_are_shown_where_data_are_not(tmp_path, monkeypatch):
@@ -125,7 +118,7 @@ def test_two_tables_that_are_exchanged_are_another_task(tmp_path):
     assert task.key != exchanged.key
 
 
-def test_results_of_other_versions_are_told_wherever_they_are_shown(tmp_path):
+def test_results_of_other_versions_are_told_and_those_of_an_older_form_computed_again(tmp_path):
     table(tmp_path / "t.csv", 1, 50.0)
     planned = read_experiment(experiment(tmp_path, "t.csv"), ["seeds=2"])
     results = Results(tmp_path / "out")
@@ -141,18 +134,10 @@ def test_results_of_other_versions_are_told_wherever_they_are_shown(tmp_path):
     assert number == 1
     assert how in summary.as_json()["other_versions"]
     assert escape(how) in write_page(summary, results).read_text()
-
-
-def test_a_result_of_an_older_form_is_computed_again(tmp_path):
-    table(tmp_path / "t.csv", 1, 50.0)
-    planned = read_experiment(experiment(tmp_path, "t.csv"))
-    results = Results(tmp_path / "out")
-    run_experiment(planned, results, Serial)
-    done, _ = results.read(planned.tasks()[0])
     results.add(evolve(done, result={key: value for key, value in done.result.items() if key != "simulated"}))
     assert len(summarise(planned, results).unreadable) == 1
     account = run_experiment(planned, results, Serial, resume=True)
-    assert (account.kept, account.done) == (0, 1)
+    assert (account.kept, account.done) == (1, 1)
     assert rate_of(planned, results) == (1.0, 40)
 
 
@@ -205,6 +190,9 @@ def test_a_store_that_grew_or_was_corrected_is_another_input(tmp_path):
         set_aside(store, [3], "slipped")
         assert run_experiment(read_experiment(file), results, Serial, resume=True).done == 1
         assert rate_of(read_experiment(file), results)[1] == 23
+        restore(store, [3], "")
+        set_aside(store, [3], "slipped, as the film shows")
+        assert run_experiment(read_experiment(file), results, Serial, resume=True).kept == 1
 
         names = [f"store:{tmp_path}/s", f"store:{tmp_path}/s#3"]  # the store, and one of its trials
         recording = next(store.recordings.glob("*.mcap"))
@@ -343,12 +331,14 @@ LAW = """
 import helper
 from helpers.law import a
 weights = [Path(__file__).parents[2] / "data" / "weights.txt", "near.txt", os.environ["LAB_WEIGHTS"]]
-late = import_module("lab_late"), os.environ.get("LAB_SCALE")
+late = import_module("lab_late"), os.environ.get("lab_scale"), Path(__file__).parent / "../../data/more.txt"
 """
 
 
 def test_the_code_of_a_plugin_counts_with_what_it_imports_and_names(tmp_path, monkeypatch):
-    texts = dict.fromkeys(["src/helpers/law.py", "src/near.txt", "data/weights.txt", "far.txt"], "")
+    texts = dict.fromkeys(
+        ["src/helpers/law.py", "src/near.txt", "data/weights.txt", "data/more.txt", "far.txt"], ""
+    )
     texts |= {"src/my_plugin/law.py": LAW, "src/helper.py": "import lab_deep, attrs, lab_lost"}
     texts |= {"library/lab_late.py": "", "library/lab_deep/__init__.py": ""}
     for name, text in texts.items():
@@ -370,7 +360,7 @@ def test_the_code_of_a_plugin_counts_with_what_it_imports_and_names(tmp_path, mo
         (tmp_path / name).write_text(f"{text}\n# changed")
         assert content() not in known, name
         known.append(content())
-    monkeypatch.setenv("LAB_SCALE", "2")
+    monkeypatch.setenv("lab_scale", "2")
     assert content() not in known
     developed = input_content.developed_code("my_plugin.law")
     (tmp_path / "src" / "my_plugin" / "law.py").write_text("a = 333")

@@ -4,11 +4,11 @@ import pytest
 from cases import every_case
 from repository import ROOT
 
-from graspsense import read_experiment
 from graspsense.core.grasp.runner import run_grasp
 from graspsense.core.pipeline.wiring import check
+from graspsense.experiments.experiment_file import read_plan
 
-CASES = read_experiment("which_gripper").cases
+CASES = read_plan("which_gripper").cases
 PAGE = (ROOT / "docs" / "which_gripper.md").read_text(encoding="utf-8")
 THINGS = (ROOT / "benchmarks" / "results" / "which_gripper.md").read_text(encoding="utf-8")
 

@@ -1,7 +1,9 @@
 """Recover: whatever a killed program left, nothing that was felt and reached the disk is lost."""
 
+import errno
 import json
 import shutil
+from unittest.mock import Mock
 
 import pytest
 from attrs import evolve
@@ -11,6 +13,7 @@ from mcap.reader import make_reader
 
 from graspsense.core.files.whole_file import SaveFailed
 from graspsense.core.values.errors import ConfigError, DataDamaged
+from graspsense.experiments.results import Results
 from graspsense.recording.reader import read_recorded
 from graspsense.store.recover import recover_file, recover_store
 from graspsense.store.store import Store
@@ -92,6 +95,17 @@ def test_a_recording_that_is_being_written_is_left_alone(store):
     assert verify_store(store.folder).unfinished == ()
     file.finish()
     assert [recovered.what for recovered in recover_store(store)] == ["added"]
+
+
+def test_on_a_disk_without_locks_only_what_may_be_being_written_is_left_alone(store, monkeypatch):
+    path = part(store)
+    monkeypatch.setattr("fcntl.flock", Mock(side_effect=OSError(errno.ENOLCK, "No locks available")))
+    keep(store)
+    (recovery,) = recover_store(store)
+    assert (recovery.what, path.exists(), "locks" in recovery.why) == ("busy", True, True)
+    assert len(verify_store(store.folder).unfinished) == 1
+    with Results(store.folder.parent / "results").alone():
+        pass
 
 
 def test_a_recording_is_not_replaced_by_an_unfinished_one_of_its_name(store):

@@ -24,6 +24,7 @@ from graspsense.store.changes import set_aside
 from graspsense.store.labels import labels_of
 from graspsense.store.recover import recover_store
 from graspsense.store.store import Store
+from graspsense.store.stored_grasps import stored_grasp, stored_grasps
 from graspsense.store.verify import verify_file, verify_store
 
 
@@ -150,23 +151,6 @@ def test_a_newer_version_that_only_the_log_knows_is_refused(store):
         assert_refused(store, ConfigError, "Update graspsense")
 
 
-def test_an_older_store_is_brought_up_to_date_with_all_that_is_in_it(tmp_path, monkeypatch):
-    older = schema.VERSIONS
-    with Store.open(tmp_path / "trials") as store:
-        keep(store)
-    newer = (*older, ("ALTER TABLE trial ADD COLUMN mood TEXT", "CREATE INDEX by_mood ON trial (mood)"))
-    monkeypatch.setattr(schema, "VERSIONS", newer)
-    schema.tables_of_version.cache_clear()
-    monkeypatch.setattr(schema, "NEWEST", len(newer))
-    for module in ("store", "opening"):
-        monkeypatch.setattr(f"graspsense.store.{module}.NEWEST", len(newer))
-    with Store.read(tmp_path / "trials") as store:
-        assert store.trial(1).result.features.values == (0.066, 5.5)
-        assert store.query("SELECT mood FROM trial") == [(None,)]
-        assert store.query("PRAGMA user_version") == [(len(newer),)]
-    schema.tables_of_version.cache_clear()
-
-
 def test_a_migration_that_fails_leaves_the_store_as_it_was(tmp_path, monkeypatch):
     with Store.open(tmp_path / "trials") as store:
         keep(store)
@@ -216,10 +200,14 @@ def test_what_is_no_store_is_told_and_left_alone(store, content):
     assert path.read_bytes() == content
 
 
-def test_reading_makes_no_store(tmp_path):
-    with pytest.raises(ConfigError, match=r"nowhere.*store.sqlite"):
-        Store.read(tmp_path / "nowhere")
+def test_reading_makes_no_store_and_opening_makes_it_whatever_its_name(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    name = "file:trials"  # which SQLite can take for an address
+    with pytest.raises(ConfigError, match=rf"{name}.*store.sqlite"):
+        Store.read(name)
     assert list(tmp_path.iterdir()) == []
+    Store.open(name).close()
+    assert (tmp_path / name / "store.sqlite").is_file()
 
 
 def test_a_row_cannot_name_a_file_outside_of_the_store(store):
@@ -273,6 +261,16 @@ def test_verify_finds_what_became_of_recordings(store):
     assert "damaged" in findings.problems[2]
     assert findings.unfinished == ("loose.mcap has no row",)
     assert verify_file(store.folder / "store.sqlite") == findings
+
+
+def test_a_whole_recording_in_the_place_of_another_one_is_not_taken_for_it(store):
+    paths = [store.trial(keep(store, ticks=ticks)).recording for ticks in (20, 30)]
+    grasp, _ = stored_grasps(store.folder)
+    paths[0].write_bytes(paths[1].read_bytes())
+    for read in (grasp.trace, lambda: stored_grasp(f"{store.folder}#1")):
+        with pytest.raises(DataDamaged, match=f"{paths[0].name}.*aside"):
+            read()
+    assert len(stored_grasp(f"{store.folder}#2")) == 30
 
 
 @pytest.mark.parametrize("log", [False, True], ids=["closed", "with a log"])

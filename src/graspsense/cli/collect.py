@@ -33,7 +33,6 @@ from graspsense.store.labels import agrees
 if TYPE_CHECKING:
     from graspsense.core.values.trial import Trial
     from graspsense.store.collecting import Collection
-    from graspsense.store.store import Store
 
 _LABEL = 14
 
@@ -79,6 +78,7 @@ def collect(
     label selects the object. Answers can come from a file.
     """
     from graspsense.store.collecting import Collection, Wanted
+    from graspsense.store.recover import recover_store
     from graspsense.store.store import Store
 
     live = LiveOptions.taken_from(asked)
@@ -100,7 +100,9 @@ def collect(
         return settings_of(**{**asked, "seed": number, **({"object_name": word} if selects else {})})
 
     with Store.open(save) as store, shown_live(live, save) as shown:
-        _prepare(store, values)
+        for left in recover_store(store):  # by an interrupted run
+            talk(left.words)
+        refuse_other_units(store, [value_label(text)[0] for text in values])
         collection = Collection(
             store=store,
             wanted=wanted,
@@ -202,18 +204,6 @@ def _has_model(settings: Settings) -> bool:
         talk(f"note: collecting without predictions: {str(error).splitlines()[0]}")
         return False
     return True
-
-
-def _prepare(store: Store, values: tuple[str, ...]) -> None:
-    """Complete the trials of an interrupted run, and print what became of each. Raises ConfigError for other units."""
-    from graspsense.store.recover import recover_store
-
-    for recovered in recover_store(store):
-        number = f" as trial {recovered.trial}" if recovered.trial is not None else ""
-        talk(
-            f"{recovered.file.name}: {recovered.what}{number}{f' ({recovered.why})' if recovered.why else ''}"
-        )
-    refuse_other_units(store, [value_label(text)[0] for text in values])
 
 
 def _ask(question: str) -> str | None:

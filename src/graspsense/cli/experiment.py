@@ -157,10 +157,10 @@ def _counts(account: Account, problem: str) -> dict[str, object]:
 
 def _list(known: Iterable[str]) -> None:
     from graspsense.experiments.duration import ESTIMATED_FROM, effort_of
-    from graspsense.experiments.experiment_file import read_experiment
+    from graspsense.experiments.experiment_file import read_plan
 
     cores = os.cpu_count() or 1
-    planned = {name: read_experiment(name) for name in known}
+    planned = {name: read_plan(name) for name in known}
     efforts = {name: effort_of(experiment) for name, experiment in planned.items()}
     echo_values(
         [

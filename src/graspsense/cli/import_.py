@@ -26,6 +26,7 @@ from graspsense.cli.terminal import (
     echo_entries,
     echo_entry,
     echo_rows,
+    talk,
     values_alone,
 )
 from graspsense.core.components.registry import installed
@@ -309,11 +310,15 @@ def _store(
     """Store the recordings that the store does not have. Raises SaveFailed."""
     from graspsense.sources.importing.import_recording import import_recording
     from graspsense.sources.recordings.dataset_recordings import handed_over
-    from graspsense.store.imported_contents import AlreadyImported, ImportedContents
+    from graspsense.store.imported_contents import AlreadyImported, ImportedContents, imported_alone
+    from graspsense.store.recover import recover_store
     from graspsense.store.store import Store
 
     stored = _Stored([], [], [])
-    with Store.open(save) as store, ProgressLine() as progress:
+    waiting = partial(talk, f"waiting for another import into {save}")
+    with Store.open(save) as store, imported_alone(store, waiting), ProgressLine() as progress:
+        for left in recover_store(store):  # by a killed import, which is not imported again
+            talk(left.words)
         contents = ImportedContents(store)
         for done, recording in enumerate(recordings):
             source = recording.labelled.source

@@ -44,12 +44,7 @@ def recover(source: str, out: str | None) -> None:
         recovered = [recover_file(source, out)]
     echo_values({"files": [trial.as_json() for trial in recovered]})
     for trial in recovered:
-        where = f" as trial {trial.trial}" if trial.trial is not None else f" in {trial.recording}"
-        why = f": {trial.why}" if trial.why else ""
-        echo(
-            f"{trial.file.name}: {trial.what}{where if trial.recording else ''}, {trial.ticks} ticks{why}",
-            indent=2,
-        )
+        echo(trial.words, indent=2)
     if not recovered:
         echo("nothing to recover")
     if any(trial.what == "failed" for trial in recovered):

@@ -42,13 +42,21 @@ The pipelines of the parts stand in the file that a folder of results keeps.
 """
 
 
-def read_experiment(
-    asked: str, options: Sequence[str] = (), within: Sequence[str] = (), *, force: bool = False
-) -> Planned:
+def read_experiment(asked: str, options: Sequence[str] = (), *, force: bool = False) -> Planned:
     """Read an experiment of graspsense by name, or a `.toml` file; `options` override its keys as `-o` does.
 
-    `within` names the experiments that this one is a part of. `force` accepts settings outside of their plausible
-    ranges. Raises ConfigError that lists all errors with their files and lines.
+    `force` accepts settings outside of their plausible ranges. Raises ConfigError that lists all errors with their
+    files and lines.
+    """
+    return read_plan(asked, options, force=force).with_inputs()
+
+
+def read_plan(
+    asked: str, options: Sequence[str] = (), within: Sequence[str] = (), *, force: bool = False
+) -> Planned:
+    """Read an experiment as `read_experiment` does, but not the content of its inputs, which can be many files.
+
+    `within` names the experiments that this one is a part of.
     """
     layer, base, name = _found(asked)
     identity = asked if base is None else str(Path(os.path.expanduser(asked)).resolve())
@@ -81,10 +89,8 @@ def read_experiment(
     if experiment is None or complaints:
         raise ConfigError("\n".join(complaints))
     if experiment.parts:
-        planned = _of_parts(name, experiment, layer, within, force=force)
-    else:
-        planned = CasePlan(name, experiment, layer, force=force).planned()
-    return planned.with_inputs() if len(within) == 1 else planned
+        return _of_parts(name, experiment, layer, within, force=force)
+    return CasePlan(name, experiment, layer, force=force).planned()
 
 
 def _known_paths(values: Mapping[str, Any]) -> list[str]:
@@ -104,7 +110,7 @@ def _of_parts(
     seeds = experiment.listed_seeds
     parts: list[Planned] = []
     for asked in experiment.parts:
-        parts.append(read_experiment(asked, [f"seeds={list(seeds)}"], within, force=force))
+        parts.append(read_plan(asked, [f"seeds={list(seeds)}"], within, force=force))
         if too_many := CASES.exceeded(sum(len(part.cases) for part in parts)):
             raise ConfigError(f"{layer.where(('parts',))}: {too_many}")
     pipelines: dict[str, Settings] = {}

@@ -10,7 +10,6 @@ OUT/report.html       the page
 
 from __future__ import annotations
 
-import fcntl
 import hashlib
 import json
 import os
@@ -26,13 +25,13 @@ from attrs import evolve, frozen
 from graspsense.core.components.caller import option
 from graspsense.core.components.strict import plain
 from graspsense.core.files.toml_text import toml_lines
-from graspsense.core.files.whole_file import SaveFailed, write_or_replace
+from graspsense.core.files.whole_file import SaveFailed, locked, opened_file, write_or_replace
 from graspsense.core.settings.resolved import without_followers
 from graspsense.core.settings.settings_file import to_toml
 from graspsense.core.values.errors import ConfigError, named
 from graspsense.evaluation.json_codec import from_json
 from graspsense.experiments.experiment import PipelineOf, Planned
-from graspsense.experiments.experiment_file import read_experiment
+from graspsense.experiments.experiment_file import read_plan
 from graspsense.experiments.task import Task, TaskResult
 from graspsense.experiments.versions import versions
 from graspsense.recording.provenance import process_provenance
@@ -69,14 +68,15 @@ class Results:
         """Return the result of a task, or None and why its file cannot be read; the reason is empty without a file."""
         path = self.path(task.key)
         try:
-            done = TaskResult.from_text(path.read_text(encoding="utf-8"))
+            with opened_file(path) as file:
+                done = TaskResult.from_text(file.read().decode())
             if done.key != task.key:
                 raise ValueError("it is the result of another task")
             done.decoded(task.kind)
         except FileNotFoundError:
             return None, ""
         except OSError as error:
-            return None, f"{path}: {error.strerror}"
+            return None, f"{path}: {error.strerror or error}"
         except ValueError as error:
             return None, f"{path} is damaged, or of another version: {named(error)}"
         return done, ""
@@ -123,7 +123,7 @@ class Results:
 
     def experiment(self) -> Planned:
         """Return the experiment of the folder, under the name that it was run by. Raises ConfigError."""
-        planned = read_experiment(str(self.folder / EXPERIMENT), force=True)
+        planned = read_plan(str(self.folder / EXPERIMENT), force=True)
         provenance = self.provenance()
         # The results are those of the inputs that there were. Without them, an earlier version made the results.
         inputs = provenance.get("inputs") or {}
@@ -142,13 +142,11 @@ class Results:
                 f"({option('out', python='Results')})"
             ) from error
         try:
-            try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError:
+            if locked(lock) is False:
                 raise ConfigError(
                     f"another run is writing to {self.folder}: wait for it, or name another folder "
                     f"({option('out', python='Results')})"
-                ) from None
+                )
             yield
         finally:
             os.close(lock)

@@ -261,7 +261,6 @@ class Summary:
 def summarise(planned: Planned, results: Results) -> Summary:
     """Return the summary of the results in a folder."""
     by_condition: dict[tuple[str, str, Target], dict[int, ClassifierResult]] = {}
-    simulated: dict[str, bool] = {}
     decoded: dict[tuple[str, int], AnyTaskResult] = {}
     failed, unreadable, missing, seconds, cpu_seconds = [], [], 0, 0.0, 0.0
     of_last_run = results.provenance().get("versions")
@@ -283,7 +282,6 @@ def summarise(planned: Planned, results: Results) -> Summary:
                 failed.append(task_result)
                 continue
             decoded[case.name, seed] = result
-            simulated[case.name] = result.simulated
             if isinstance(result, RecognitionResult):
                 for outcome in result.classifiers:
                     by_condition.setdefault((case.name, outcome.classifier, outcome.target), {})[seed] = (
@@ -298,7 +296,7 @@ def summarise(planned: Planned, results: Results) -> Summary:
                 classifier=classifier,
                 target=target,
                 by_seed=by_seed,
-                simulated=simulated[case],
+                simulated=decoded[case, next(iter(by_seed))].simulated,
             )
             for (case, classifier, target), by_seed in by_condition.items()
         ),

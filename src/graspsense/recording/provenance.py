@@ -21,15 +21,15 @@ _WITH: Final = ("numpy", "scikit-learn", "mcap")
 def provenance(settings: Settings) -> dict[str, Any]:
     """Return the hash of the settings, component and library versions, the commit, and the machine."""
     return {
-        "config_sha256": config_sha256(settings.values),
+        "config_sha256": json_sha256(settings.values),
         "components": dict(settings.components),
         "seed": settings.run.seed,
         **process_provenance(),
     }
 
 
-def config_sha256(values: Mapping[str, Any]) -> str:
-    """Return a hash of resolved settings, equal for equal settings."""
+def json_sha256(values: Any) -> str:
+    """Return a hash of values, such as resolved settings, equal for equal ones."""
     return hashlib.sha256(json_text(values).encode()).hexdigest()
 
 

@@ -5,6 +5,7 @@ Files are not trusted: lengths are bounded, checksums are verified, and nothing 
 
 from __future__ import annotations
 
+import hashlib
 import os
 import struct
 from collections.abc import Iterator
@@ -52,12 +53,12 @@ def largest_record() -> int:
     return max(1 << 26, (1 << 25) + 24 * CHANNEL_NUMBERS.most)
 
 
-def read_recorded(path: str | Path, *, salvage: bool = False) -> RecordedGrasp:
+def read_recorded(path: str | Path, *, salvage: bool = False, sha256: str = "") -> RecordedGrasp:
     """Return the grasp in a recording.
 
     With `salvage`, return what can be read of a file that is damaged or has no end. Without it, such a file raises
-    DataDamaged. Raises ConfigError if the file cannot be opened or is of another kind, TooLarge if it unpacks to more
-    than is allowed.
+    DataDamaged, as does a whole file whose hash is not `sha256`, which a store has of the recording of a trial. Raises
+    ConfigError if the file cannot be opened or is of another kind, TooLarge if it unpacks to more than is allowed.
     """
     path = Path(os.path.expanduser(path))
     reading = _PartialGrasp(path)
@@ -71,10 +72,17 @@ def read_recorded(path: str | Path, *, salvage: bool = False) -> RecordedGrasp:
                     f"{path} is no recording (.mcap): neither its name nor its content is that of one"
                 )
             damage = reading.take_all(file, salvage)
+            file.seek(0)
+            replaced = sha256 and hashlib.file_digest(file, "sha256").hexdigest() != sha256
     if not salvage:
         damage = damage or reading.shortfall()
         if damage:
             raise _damaged(path, damage)
+        if replaced:
+            raise DataDamaged(
+                f"the recording {path} is not that of its trial: another file has taken its place. Put the right one "
+                "back, or set the trial aside"
+            )
     grasp = reading.grasp(damage, salvage)
     if not salvage:
         grasp.told_events()

@@ -48,14 +48,14 @@ _OUTCOMES: Final = frozenset(outcome.words for outcome in Outcome)
 class DeviceRecord:
     """The gripper of a trial, as `DeviceInfo` described it when it was opened."""
 
-    name: str = ""
-    serial: str = ""
-    firmware: str = ""
-    clock: str = ""
-    simulated: bool = False
-    rate_hz: float = 0.0
-    calibration: Mapping[str, str] = field(factory=dict)
-    numbers: Mapping[str, float | str] = field(factory=dict)
+    name: str = field(default="", converter=str)
+    serial: str = field(default="", converter=str)
+    firmware: str = field(default="", converter=str)
+    clock: str = field(default="", converter=str)
+    simulated: bool = field(default=False, converter=bool)
+    rate_hz: float = field(default=0.0, converter=float)
+    calibration: Mapping[str, str] = field(factory=dict, converter=dict)
+    numbers: Mapping[str, float | str] = field(factory=dict, converter=dict)
     units: Mapping[str, str] = field(factory=dict)
     notes: tuple[str, ...] = ()
     channels: tuple[Channel, ...] = ()
@@ -86,25 +86,17 @@ class DeviceRecord:
 
     @classmethod
     def from_text(cls, text: str) -> DeviceRecord:
-        """Return the device that `to_text` wrote. Raises TypeError or ValueError for any other text."""
+        """Return the device that `to_text` wrote. Raises KeyError, TypeError or ValueError for any other text."""
         value = json_table(text)
-        texts = {name: str(value.get(name, "")) for name in ("name", "serial", "firmware", "clock")}
+        known = {name: value[name] for name in cls.__annotations__ if name in value}
         units, notes = value.get("units", {}), value.get("notes", [])
         if not isinstance(units, dict) or not all(isinstance(unit, str) for unit in units.values()):
             raise TypeError("the units of the gripper are not a table of texts")
         if not isinstance(notes, list):
             raise TypeError("the notes on the gripper are not a list")
-        return cls(
-            **texts,
-            simulated=bool(value.get("simulated", False)),
-            rate_hz=float(value.get("rate_hz", 0.0)),
-            calibration=dict(value.get("calibration", {})),
-            numbers=dict(value.get("numbers", {})),
-            units=units,
-            notes=tuple(str(note) for note in notes),
-            channels=_channels(value.get("channels", [])),
-            mounting=mounting_from_json(value.get("mounting", {})),
-        )
+        channels = tuple(map(from_json, value.get("channels", [])))
+        mounting = mounting_from_json(value.get("mounting", {}))
+        return cls(**{**known, "notes": tuple(map(str, notes)), "channels": channels, "mounting": mounting})
 
 
 @frozen(kw_only=True)
@@ -228,16 +220,6 @@ class TrialRecord:
         if RESULT in metadata:
             result = _decoded(f"the result in {where} cannot be read", lambda: _result(metadata[RESULT]))
         return evolve(start, device=device, result=result)
-
-
-def _channels(values: Any) -> tuple[Channel, ...]:
-    """Return channels from the description of a gripper. Raises TypeError or ValueError."""
-    if not isinstance(values, list) or not all(isinstance(value, dict) for value in values):
-        raise TypeError("the channels of the gripper are not a list of tables")
-    try:
-        return tuple(from_json(value) for value in values)
-    except KeyError as error:
-        raise ValueError(f"a channel of the gripper is not described: {error}") from error
 
 
 def json_table(text: str) -> dict[str, Any]:

@@ -7,7 +7,6 @@ survive a loss of power.
 from __future__ import annotations
 
 import errno
-import fcntl
 import hashlib
 import json
 import os
@@ -20,7 +19,7 @@ from typing import Final
 from mcap.writer import CompressionType, Writer
 
 from graspsense import __version__
-from graspsense.core.files.whole_file import sync_folder
+from graspsense.core.files.whole_file import locked, sync_folder
 from graspsense.recording.layout import (
     CDR_HEADER,
     IS_END,
@@ -56,7 +55,8 @@ class RecordingWriter:
             self.remove()
             raise FileExistsError(errno.EEXIST, "the recording already exists", str(path))
         # A process that cannot get this lock leaves the file alone: it is being written.
-        fcntl.flock(self._out.fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        if locked(self._out.fd) is False:
+            raise BlockingIOError(errno.EAGAIN, "another program has locked it", str(self.part))
         self._mcap = Writer(
             self._out,  # type: ignore[arg-type]
             chunk_size=1 << 24,

@@ -130,18 +130,18 @@ def _newest_readable(store: Store, listed: Sequence[TrialSummary]) -> StoredTria
 def _curves(store: Store) -> tuple[list[GraspCurve], list[UnreadableRecording]]:
     """Return the newest complete grasps and the newest of each label, newest first, and those that cannot be read."""
     rows = store.query(
-        """SELECT coalesce(label, ''), id, recording FROM trial
+        """SELECT coalesce(label, ''), id, recording, recording_sha256 FROM trial
         WHERE complete = 1 AND set_aside IS NULL ORDER BY id DESC"""
     )
     count: Counter[str] = Counter()
     curves: list[GraspCurve] = []
     unreadable: list[UnreadableRecording] = []
-    for label, number, recording in rows:
+    for label, number, recording, sha256 in rows:
         if len(curves) >= CURVES and (count[label] >= GRASPS or not label):
             continue
         try:
             with readable(f"trial {number} of {store.folder}"):
-                trace = read_recorded(store.recording_path(recording)).trace()
+                trace = read_recorded(store.recording_path(recording), sha256=sha256).trace()
         except (ConfigError, DataDamaged) as error:
             unreadable.append(UnreadableRecording(source=f"trial {number}", error=error))
             continue
@@ -174,7 +174,7 @@ def _measurement_sections(
     label = summary.label or NO_LABEL
     further = ""
     try:
-        recorded = read_recorded(trial.recording)
+        recorded = read_recorded(trial.recording, sha256=trial.recording_sha256)
         trace = recorded.trace()
         curve = grasp_curve(trace, label, summary.id)
         body = one_grasp(curve, f"Trial {summary.id}: {label}, {summary.outcome}, made {summary.made_at}.")

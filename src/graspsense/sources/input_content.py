@@ -32,14 +32,15 @@ from graspsense.store.opening import STORE, as_source, place_and_number
 FRAMEWORK: Final = "graspsense"
 _OWN_PLUGINS: Final = "graspsense.plugins"
 _CALIBRATION: Final = "calibration"
-_OF_TRIALS: Final = """SELECT id, recording, recording_bytes, sha256, label, instance, set_aside, hex("values")
+_OF_TRIALS: Final = """SELECT id, recording, recording_bytes, sha256, label, instance, set_aside IS NULL, hex("values")
     FROM trial JOIN detail ON detail.trial = id ORDER BY id"""
+_OF_CHANGES: Final = """SELECT trial, "action", "before", "after" FROM change
+    WHERE "action" NOT IN ('aside', 'restore') ORDER BY id"""
 _REQUIREMENT: Final = re.compile(r"([\w.-]+)(?!.*\bextra\b)")
 _IMPORTED: Final = re.compile(
     r"^[ \t]*from[ \t]+(\w[\w.]*)|^[ \t]*import[ \t]+([\w., \t]+)|(?:import_module|__import__)\(\s*[\"'](\w[\w.]*)",
     re.MULTILINE,
 )
-_VARIABLE: Final = re.compile("[A-Z][A-Z0-9_]+")
 _QUOTED: Final = re.compile(r"\"[^\"\n]{1,1000}\"|'[^'\n]{1,1000}'")
 
 
@@ -164,10 +165,11 @@ def _hash_of_code(version: str, module: str) -> str:
         return version
     code = _code_of(package)
     texts = set[str]().union(*code.values())
-    variables = {text: os.environ.get(text, "") for text in texts if _VARIABLE.fullmatch(text)}
+    variables = {text: os.environ[text] for text in texts & os.environ.keys() if len(text) > 1}
     texts.update(variables.values())
-    developed = [os.path.dirname(place) for place in code if _is_developed(place)]
-    folders = {os.curdir, *developed, *map(os.path.dirname, developed)}
+    developed = [place for place in code if _is_developed(place)]
+    above = list(map(os.path.dirname, developed))
+    folders = {os.curdir, *developed, *above, *map(os.path.dirname, above)}
     files = _files_in(folders, {*texts, *(f"{text}.py" for text in texts)})
     named = sorted(files.union(*(_named_files(file, (), set()) for file in files)))
     values = [f"{name}={value}" for name, value in sorted(variables.items())]
@@ -242,7 +244,7 @@ def _is_developed(place: str) -> bool:
 
 
 def _hash_of_store(folder: str) -> str:
-    """Return a hash of the trials of a store, of all changes of them, and of recordings that are lost or were replaced.
+    """Return a hash of the trials of a store, of changes of their labels, and of recordings that are lost or replaced.
 
     A recording is known by its size: to read all of them takes as long as to evaluate them.
     """
@@ -251,7 +253,7 @@ def _hash_of_store(folder: str) -> str:
     try:
         with Store.read(folder) as store:
             trials = store.query(_OF_TRIALS)
-            changes = store.query('SELECT trial, "action", "before", "after" FROM change ORDER BY id')
+            changes = store.query(_OF_CHANGES)
             sizes = [_bytes_of(store.recording_path(name)) for _, name, *_ in trials]
             lost = [[*row[:2], size] for row, size in zip(trials, sizes, strict=True) if size != row[2]]
     except GraspsenseError as error:

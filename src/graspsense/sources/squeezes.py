@@ -79,7 +79,7 @@ def _of_store(folder: str, number: int | None = None) -> Iterator[RecordedSqueez
         complete = (trial.id for trial in store.page(limit=1_000_000) if trial.complete)
         for k in [number] if number is not None else reversed([*complete]):
             trial = store.trial(k)
-            grasp = read_recorded(trial.recording)
+            grasp = read_recorded(trial.recording, sha256=trial.recording_sha256)
             yield _of_grasp(grasp, trial.record, f"{folder}#{k}", trial.recording_sha256)
 
 

@@ -273,8 +273,8 @@ def _tables_again(
 ) -> tuple[_Rows, _Tables]:
     """Return the rows and tables of trials that were extracted again, without those that have other features."""
     notes += note_on(extracted.unreadable, len(rows))
-    read, trials = set(extracted.numbers), extracted.trials
-    rows = rows.picked([i for i, number in enumerate(rows.id) if number in read])
+    trials = list(extracted.trials.values())
+    rows = rows.picked([i for i, number in enumerate(rows.id) if number in extracted.trials])
     headings = [(trial.features.names, trial.features.units) for trial in trials]
     same = [i for i, heading in enumerate(headings) if heading == headings[-1]]
     if len(same) < len(trials):

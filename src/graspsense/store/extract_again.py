@@ -46,13 +46,12 @@ class ExtractedAgain:
 
 @frozen(kw_only=True)
 class ExtractedTrials:
-    """Trials under other settings, with the settings and components of the last of them.
+    """Trials under other settings by their numbers, with the settings and components of the last of them.
 
-    `numbers` are those of the trials. `unreadable` are the others that were asked for, with what is wrong.
+    `unreadable` are the others that were asked for, with what is wrong.
     """
 
-    trials: tuple[ExtractedAgain, ...]
-    numbers: tuple[int, ...]
+    trials: Mapping[int, ExtractedAgain]
     unreadable: tuple[UnreadableRecording, ...]
     settings: Mapping[str, Mapping[str, Any]]
     components: Mapping[str, str]
@@ -107,8 +106,7 @@ def extract_again(
             raise error_of_all(unreadable)
         raise ConfigError(f"the store in {store.folder} has no trial to extract features from")
     return ExtractedTrials(
-        trials=tuple(extracted.values()),
-        numbers=tuple(extracted),
+        trials=extracted,
         unreadable=tuple(unreadable),
         settings=dict(settings.values),
         components=dict(settings.components),

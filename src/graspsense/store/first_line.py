@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from typing import Final
 
@@ -20,9 +20,15 @@ NAMES: Final = tuple(f"{channel}_first" for channel in _FIELDS)
 UNITS: Final = tuple(CHANNELS[channel] for channel in _FIELDS)
 
 
-def numbers_of(frame: Frame) -> list[float]:
-    """Return the numbers of a frame, in the order of `NAMES`."""
-    return [getattr(frame, field) for field in _FIELDS.values()]
+def first_line_table(frames: Iterable[Frame | None]) -> FeatureTable:
+    """Return the numbers of the first frames of trials; NaN where there is none, or no finite number."""
+    missing = [np.nan] * len(NAMES)
+    rows = [
+        missing if frame is None else [getattr(frame, name) for name in _FIELDS.values()] for frame in frames
+    ]
+    values = np.array(rows, dtype=np.float64).reshape(-1, len(NAMES))
+    values[np.isinf(values)] = np.nan
+    return FeatureTable(names=NAMES, units=UNITS, values=values)
 
 
 def first_lines(store: Store, recordings: Sequence[str], origins: Sequence[str]) -> FeatureTable | None:
@@ -32,16 +38,12 @@ def first_lines(store: Store, recordings: Sequence[str], origins: Sequence[str])
     """
     if "import" not in origins:
         return None
-    values = np.full((len(recordings), len(NAMES)), np.nan)
+    frames: list[Frame | None] = [None] * len(recordings)
     for row, (recording, origin) in enumerate(zip(recordings, origins, strict=True)):
-        if origin != "import":
-            continue
-        with suppress(ConfigError, DataDamaged):
-            frame = read_first_frame(store.recording_path(recording))
-            if frame is not None:
-                values[row] = numbers_of(frame)
-    values[np.isinf(values)] = np.nan
-    return FeatureTable(names=NAMES, units=UNITS, values=values)
+        if origin == "import":
+            with suppress(ConfigError, DataDamaged):
+                frames[row] = read_first_frame(store.recording_path(recording))
+    return first_line_table(frames)
 
 
 def imported_gaps(store: Store, recordings: Sequence[str], origins: Sequence[str]) -> Iterator[list[float]]:

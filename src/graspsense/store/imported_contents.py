@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import json
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Final
 
+from graspsense.core.files.whole_file import locked
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.recording.reader import read_recorded
 from graspsense.recording.replayable import content_sha256
@@ -19,7 +23,7 @@ class AlreadyImported(ConfigError):
 
 
 class ImportedContents:
-    """The contents of the imported trials of a store that are not set aside.
+    """The contents of the imported trials of a store that are complete and not set aside.
 
     A trial of an earlier version has no hash in its provenance; its recording is read.
     """
@@ -28,7 +32,7 @@ class ImportedContents:
         self._folder = store.folder
         self._trials: dict[str, int] = {}
         self._sources: dict[str, int] = {}
-        imported = "origin = 'import' AND set_aside IS NULL"
+        imported = "origin = 'import' AND set_aside IS NULL AND complete = 1"
         columns = store.columns(("id", "recording", "provenance"), imported)
         for number, recording, provenance in zip(*columns.values(), strict=True):
             sha256, source = _stated(provenance, CONTENT), _stated(provenance, "source")
@@ -61,6 +65,19 @@ class ImportedContents:
     def add(self, sha256: str, number: int) -> None:
         """Note the content of a trial that was just imported."""
         self._trials.setdefault(sha256, number)
+
+
+@contextmanager
+def imported_alone(store: Store, waiting: Callable[[], None]) -> Iterator[None]:
+    """Let no other import write to a store; `waiting` is called if one has to end first."""
+    folder = os.open(store.recordings, os.O_RDONLY)
+    try:
+        if locked(folder) is False:
+            waiting()
+            locked(folder, waits=True)
+        yield
+    finally:
+        os.close(folder)
 
 
 def _stated(provenance: str, key: str) -> str | None:

@@ -103,13 +103,10 @@ def connect_read_only(path: Path) -> sqlite3.Connection:
     try:
         connection.execute("SELECT count(*) FROM sqlite_schema").fetchone()
         return connection
-    except sqlite3.OperationalError as error:
+    except BaseException as error:
         connection.close()
-        if error.sqlite_errorcode & 0xFF not in _NO_SHARED_MEMORY:
+        if getattr(error, "sqlite_errorcode", 0) & 0xFF not in _NO_SHARED_MEMORY:
             raise
-    except BaseException:
-        connection.close()
-        raise
     # A read-only or full disk has no place for the shared-memory file of readers. Without a writer none is needed.
     log = path.with_name(path.name + "-wal")
     if log.is_file() and log.stat().st_size:

@@ -5,9 +5,8 @@ Nothing is deleted. An incomplete recording is copied into a complete one, and i
 
 from __future__ import annotations
 
-import fcntl
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final, Literal
@@ -15,7 +14,7 @@ from typing import Any, Final, Literal
 from attrs import asdict, evolve, frozen
 
 from graspsense.core.components.registry import installed
-from graspsense.core.files.whole_file import SaveFailed
+from graspsense.core.files.whole_file import SaveFailed, locked
 from graspsense.core.settings.selected import build
 from graspsense.core.values.errors import FAILURES, ConfigError, DataDamaged, GraspsenseError
 from graspsense.core.values.features import Features
@@ -32,6 +31,10 @@ from graspsense.store.store import Store, integrity
 
 CUT: Final = ".cut"
 RECOVERED: Final = "-recovered.mcap"
+_WHY_BUSY: Final[Mapping[bool | None, str]] = {
+    False: "it is being written",
+    None: "this disk has no locks, so that it may be being written: recover a copy on another disk",
+}
 
 
 @frozen(kw_only=True)
@@ -49,6 +52,13 @@ class Recovered:
     recording: Path | None = None
     ticks: int = 0
     why: str = ""
+
+    @property
+    def words(self) -> str:
+        """What was done, in one line."""
+        where = f" as trial {self.trial}" if self.trial is not None else f" in {self.recording}"
+        why = f": {self.why}" if self.why else ""
+        return f"{self.file.name}: {self.what}{where if self.recording else ''}, {self.ticks} ticks{why}"
 
     def as_json(self) -> dict[str, Any]:
         """Return the fields as JSON values."""
@@ -83,7 +93,7 @@ def recover_store(store: Store) -> list[Recovered]:
             continue  # `verify` names it
         with _locked(path) as mine:
             if not mine:
-                results.append(Recovered(file=path, what="busy", why="it is being written"))
+                results.append(Recovered(file=path, what="busy", why=_WHY_BUSY[mine]))
             elif path.is_file():
                 results.append(_complete(store, path))
     return results
@@ -98,21 +108,28 @@ def recover_file(path: str | Path, out: str | Path | None = None) -> Recovered:
     path = Path(os.path.expanduser(path))
     with _locked(path) as mine:
         if not mine:
-            raise ConfigError(f"{path} is being written")
+            raise ConfigError(f"{path}: {_WHY_BUSY[mine]}")
         grasp = read_recorded(path, salvage=True)
         if grasp.complete and not path.name.endswith(PART):
             raise ConfigError(f"{path} is complete: there is nothing to recover")
         if not len(grasp):
             raise DataDamaged(f"no tick can be read from {path}: {grasp.damage or 'it has none'}")
         target = Path(os.path.expanduser(out)) if out else _beside(path)
-        with _writing(target):
-            write_copy(grasp, target)
+        write_copy(grasp, target)
     return Recovered(file=path, what="recovered", recording=target, ticks=len(grasp), why=_why(grasp))
 
 
 def write_copy(grasp: RecordedGrasp, path: Path) -> RecordingInfo:
-    """Write a recorded grasp as a new, complete recording. Raises OSError."""
-    file = RecordingWriter(path, grasp.base_ns)
+    """Write a recorded grasp as a new, complete recording. Raises SaveFailed."""
+    try:
+        return _copied(grasp, RecordingWriter(path, grasp.base_ns))
+    except FileExistsError as error:
+        raise SaveFailed(f"{path} already exists: name another file, or move it away") from error
+    except OSError as error:
+        raise SaveFailed(f"{path} cannot be written: {error.strerror}") from error
+
+
+def _copied(grasp: RecordedGrasp, file: RecordingWriter) -> RecordingInfo:
     try:
         for name in (START, DEVICE):
             if name in grasp.metadata:
@@ -162,8 +179,7 @@ def _complete(store: Store, part: Path) -> Recovered:
             part.rename(path)
             return evolve(_add_row(store, path), file=part)
         if not copy.exists():
-            with _writing(copy):
-                write_copy(grasp, copy)
+            write_copy(grasp, copy)
         result = _add_row(store, copy)
         if result.trial is not None:
             part.rename(part.with_name(path.name + CUT))
@@ -234,14 +250,14 @@ def is_being_written(path: Path) -> bool:
     """Return whether a writer is at work on this file; a file that has gone in the meantime is finished."""
     try:
         with _locked(path) as mine:
-            return not mine
+            return mine is False
     except ConfigError:
         return True
 
 
 @contextmanager
-def _locked(path: Path) -> Iterator[bool]:
-    """Hold the lock that the writer of this file holds; yield False if a writer has it."""
+def _locked(path: Path) -> Iterator[bool | None]:
+    """Hold the lock that the writer of this file holds; yield False if a writer has it, None if that is not known."""
     try:
         if path.exists() and not path.is_file():
             raise ConfigError(f"{path} is not a file")
@@ -251,19 +267,4 @@ def _locked(path: Path) -> Iterator[bool]:
     except OSError as error:
         raise ConfigError(f"the recording {path} cannot be read: {error.strerror}") from error
     with file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            yield False
-            return
-        yield True
-
-
-@contextmanager
-def _writing(path: Path) -> Iterator[None]:
-    try:
-        yield
-    except FileExistsError as error:
-        raise SaveFailed(f"{path} already exists: name another file, or move it away") from error
-    except OSError as error:
-        raise SaveFailed(f"{path} cannot be written: {error.strerror}") from error
+        yield locked(file.fileno())

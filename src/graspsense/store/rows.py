@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import struct
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
-from attrs import evolve, fields_dict, frozen
+from attrs import evolve, field, fields_dict, frozen
 
 from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.features import Features
 from graspsense.core.values.json_values import json_text
 from graspsense.recording.layout import DEVICE, START
-from graspsense.recording.provenance import recipe
+from graspsense.recording.provenance import json_sha256, recipe
 from graspsense.recording.recording_info import RecordingInfo
 from graspsense.recording.trial_record import (
     TrialRecord,
@@ -66,18 +65,17 @@ class TrialSummary:
     label: str | None
     instance: str | None
     outcome: str
-    complete: bool
+    complete: bool = field(converter=bool)
     set_aside: str | None
     """Why the trial was set aside; None if it was not."""
     device: str
-    simulated: bool
+    simulated: bool = field(converter=bool)
     recording: str
 
     @classmethod
     def from_row(cls, row: Sequence[Any]) -> TrialSummary:
         """Return the summary from a row of `SUMMARY_COLUMNS`."""
-        values = dict(zip(fields_dict(cls), row, strict=True))
-        return cls(**{**values, "complete": bool(values["complete"]), "simulated": bool(values["simulated"])})
+        return cls(**dict(zip(fields_dict(cls), row, strict=True)))
 
 
 SUMMARY_COLUMNS: Final = ", ".join(fields_dict(TrialSummary))
@@ -124,7 +122,7 @@ class EncodedRow:
             *(self.trial[name] for name in TRIAL_COLUMNS),
             *(self.detail[name] for name in DETAIL_COLUMNS),
         ]
-        return _hash(json_text([column.hex() if isinstance(column, bytes) else column for column in columns]))
+        return json_sha256([column.hex() if isinstance(column, bytes) else column for column in columns])
 
 
 def encoded(record: TrialRecord, recording: RecordingInfo, *, complete: bool) -> EncodedRow:
@@ -145,7 +143,7 @@ def encoded(record: TrialRecord, recording: RecordingInfo, *, complete: bool) ->
             "complete": int(complete),
             "device": device.label,
             "simulated": int(record.simulated),
-            "recipe": _hash(json_text(recipe(record.settings))),
+            "recipe": json_sha256(recipe(record.settings)),
             "values": _packed(result.features),
             "before_contact": _packed(result.before_contact),
             "recording": recording.path.name,
@@ -210,7 +208,3 @@ def decoded(summary: TrialSummary, row: EncodedRow, recording: Path) -> StoredTr
         recording_sha256=trial["recording_sha256"],
         recorder=json_table(detail["recorder"]),
     )
-
-
-def _hash(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()

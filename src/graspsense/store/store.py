@@ -91,7 +91,9 @@ class Store:
             raise ConfigError(f"{folder / FILE} is not a file: move it away, or name another store")
         new = is_new(folder)
         with sqlite_errors(folder):
-            connection = sqlite3.connect(folder / FILE, timeout=BUSY_S, isolation_level=None)
+            # Absolute: SQLite can take a name that begins with `file:` for an address.
+            path = (folder / FILE).absolute()
+            connection = sqlite3.connect(path, timeout=BUSY_S, isolation_level=None)
             try:
                 _prepare_to_write(connection, folder, new=new)
             except BaseException:
@@ -151,7 +153,15 @@ class Store:
 
         `record` must have a device and a result. Raises SaveFailed if the row cannot be written.
         """
-        row = encoded(record, recording, complete=complete)
+        try:
+            return self._add(encoded(record, recording, complete=complete), recording.path.name)
+        except SaveFailed as error:
+            raise SaveFailed(
+                f"{error}. The grasp is complete in {recording.path.name}: then `graspsense recover {self.folder}` "
+                "adds its trial"
+            ) from error
+
+    def _add(self, row: EncodedRow, recording: str) -> int:
         with self.transaction() as connection:
             columns = {
                 **row.trial,
@@ -167,7 +177,7 @@ class Store:
             ).fetchone()
             if inserted is None:  # `recover` has already added a row for this recording
                 query = "SELECT id FROM trial WHERE recording = ?"
-                return int(connection.execute(query, (recording.path.name,)).fetchone()[0])
+                return int(connection.execute(query, (recording,)).fetchone()[0])
             number = int(inserted[0])
             connection.execute(
                 f"INSERT INTO detail (trial, {', '.join(row.detail)}) VALUES (?{', ?' * len(row.detail)})",
@@ -190,12 +200,11 @@ class Store:
         _, row = self.encoded_row(number)
         try:
             return decoded(summary, row, self.recording_path(summary.recording))
-        except DataDamaged as error:
-            raise damaged(self.folder, str(error)) from error
         except MemoryError:
             raise
         except Exception as error:  # a row can hold any value in any place
-            raise damaged(self.folder, f"trial {number} cannot be read ({named(error)})") from error
+            unread = f"trial {number} cannot be read ({named(error)})"
+            raise damaged(self.folder, str(error) if isinstance(error, DataDamaged) else unread) from error
 
     def first_readable(self, numbers: Iterable[int]) -> StoredTrial:
         """Return the first of these trials that can be read; there is one. Raises DataDamaged if none can be."""

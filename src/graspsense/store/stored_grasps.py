@@ -42,10 +42,11 @@ class StoredGrasp:
     events: tuple[Mapping[str, Any], ...]
     channels: tuple[Channel, ...]
     recording: Path
+    recording_sha256: str
 
     def trace(self) -> Trace:
         """Return the trace of the whole recording. Raises ConfigError, DataDamaged."""
-        return read_recorded(self.recording).trace()
+        return read_recorded(self.recording, sha256=self.recording_sha256).trace()
 
 
 def stored_grasps(folder: str | Path) -> tuple[StoredGrasp, ...]:
@@ -78,6 +79,7 @@ def _grasp(store: Store, number: int) -> StoredGrasp:
         events=tuple(details.get("events") or ()),
         channels=device.channels if device else (),
         recording=trial.recording,
+        recording_sha256=trial.recording_sha256,
     )
 
 
@@ -97,8 +99,9 @@ def stored_grasp(ref: str) -> RecordedGrasp:
     folder, number = parse_trial_ref(ref)
     with Store.read(folder) as store:
         path = store.recording_path(store.summary(number).recording)
+        ((sha256,),) = store.query("SELECT recording_sha256 FROM trial WHERE id = ?", (number,))
     try:
-        return read_recorded(path)
+        return read_recorded(path, sha256=sha256)
     except ConfigError as error:
         if path.exists():
             raise

@@ -52,13 +52,8 @@ def findings(summary: Summary) -> Findings:
     paper = published()
     held = rows(summary, paper)
     checked = claims(summary)
-    tables = []
-    if held:
-        tables.append(_rates_table(held))
-    controls = _controls_table(summary, held)
-    if controls is not None:
-        tables.append(controls)
-    tables += _people_tables(summary, paper)
+    tables = [_rates_table(held)] if held else []
+    tables += [*_controls_table(summary, held), *_people_tables(summary, paper)]
     matrices, drawn = _matrices(summary, paper)
     tables += matrices
     if checked:
@@ -71,9 +66,7 @@ def findings(summary: Summary) -> Findings:
                 verdicts=(2,),
             )
         )
-    grasps = _grasps_table(summary)
-    if grasps is not None:
-        tables.append(grasps)
+    tables += _grasps_table(summary)
     whole = summary.planned.experiment.kind == "paper"
     return Findings(
         answer=_answer(held, checked),
@@ -155,8 +148,8 @@ def _headline(held: Sequence[RateComparison], checked: Sequence[Claim]) -> str:
     return f"In simulation, {'; '.join(parts)}" if parts else ""
 
 
-def _controls_table(summary: Summary, held: Sequence[RateComparison]) -> FoundTable | None:
-    """Return the controls of the rates of the paper; None if none was measured."""
+def _controls_table(summary: Summary, held: Sequence[RateComparison]) -> list[FoundTable]:
+    """Return the table of the controls of the rates of the paper; none if none was measured."""
     lines: list[tuple[str, ...]] = []
     for row in held:
         published = row.published
@@ -176,8 +169,8 @@ def _controls_table(summary: Summary, held: Sequence[RateComparison]) -> FoundTa
         if line not in lines:
             lines.append(line)
     if not lines:
-        return None
-    return FoundTable(
+        return []
+    table = FoundTable(
         id="controls",
         title="Controls",
         header=("experiment", "what", "each bottle in", "n", "our mean", *CONTROLS.values()),
@@ -188,6 +181,7 @@ def _controls_table(summary: Summary, held: Sequence[RateComparison]) -> FoundTa
         "training, so that rates without information fall below that of the most frequent label.",
         numbers=4,
     )
+    return [table]
 
 
 def _matrices(summary: Summary, paper: Published) -> tuple[list[FoundTable], dict[str, str]]:
@@ -242,8 +236,8 @@ def _matrix_rows(
     ]
 
 
-def _grasps_table(summary: Summary) -> FoundTable | None:
-    """Return how the grasps of each case went, by object; None if no case is of kind `grasp`."""
+def _grasps_table(summary: Summary) -> list[FoundTable]:
+    """Return the table of how the grasps of each case went, by object; none if no case is of kind `grasp`."""
     lines: list[tuple[str, ...]] = []
     for case in summary.planned.cases:
         rows = [row for name, _, result in grasp_results(summary) if name == case.name for row in result.rows]
@@ -264,8 +258,8 @@ def _grasps_table(summary: Summary) -> FoundTable | None:
                 )
             )
     if not lines:
-        return None
-    return FoundTable(
+        return []
+    table = FoundTable(
         id="grasps",
         title="Grasps by case and object",
         header=(
@@ -283,6 +277,7 @@ def _grasps_table(summary: Summary) -> FoundTable | None:
         note="The true peak is the force in the model, which the pads may miss.",
         numbers=4,
     )
+    return [table]
 
 
 def _median(values: Sequence[float | None], factor: float, digits: int) -> str:

@@ -67,8 +67,7 @@ def _new_part(path: Path, mode: int) -> tuple[Path, int]:
         part = path.with_name(f"{path.name}.{secrets.token_hex(8)}.part")
         # Exclusive: a link or a pipe of this name, planted by somebody, is an error and is not followed.
         fd = os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC | os.O_NOFOLLOW, mode)
-        with suppress(OSError):  # some network disks have no locks
-            _lock(fd)
+        locked(fd, waits=True)
         if os.fstat(fd).st_nlink:
             return part, fd
         os.close(fd)  # another program took it for a leftover before it was locked
@@ -105,18 +104,28 @@ def _delete_leftover(path: Path) -> None:
     with suppress(OSError):
         fd = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
         try:
-            if stat.S_ISREG(os.fstat(fd).st_mode):
-                _lock(fd, waits=False)
+            if stat.S_ISREG(os.fstat(fd).st_mode) and locked(fd):
                 path.unlink()
         finally:
             os.close(fd)
 
 
-def _lock(fd: int, *, waits: bool = True) -> None:
+def locked(fd: int, *, waits: bool = False) -> bool | None:
+    """Lock a file until it is closed, and return True, or False if another program has locked it.
+
+    With `waits`, wait for the other program. None means that the disk has no locks, as some network disks: whether
+    another program uses the file is not known.
+    """
     # Imported here: a system without it has no locks, and can still read.
     import fcntl
 
-    fcntl.flock(fd, fcntl.LOCK_EX if waits else fcntl.LOCK_EX | fcntl.LOCK_NB)
+    try:
+        fcntl.flock(fd, fcntl.LOCK_EX if waits else fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:
+        return None
+    return True
 
 
 _WITHOUT_WAITING: Final = (

@@ -43,9 +43,7 @@ def findings(summary: Summary) -> Findings:
             continue
         reports[part] = _cost_report(part, title, conditions, case.judge)
     tables = [report.table for report in reports.values()]
-    controls = _controls_table(summary, titles)
-    if controls is not None:
-        tables.append(controls)
+    tables += _controls_table(summary, titles)
     notes = [ONE_PROTOCOL]
     if "trade_force" in reports:
         table, reasons = _damage_table()
@@ -65,8 +63,8 @@ def findings(summary: Summary) -> Findings:
     )
 
 
-def _controls_table(summary: Summary, titles: Mapping[str, str]) -> FoundTable | None:
-    """Return the controls of every case that has them; None if none was measured."""
+def _controls_table(summary: Summary, titles: Mapping[str, str]) -> list[FoundTable]:
+    """Return the table of the controls of every case that has them; none if none was measured."""
     lines = []
     for condition in summary.conditions:
         if not condition.controls:
@@ -77,8 +75,8 @@ def _controls_table(summary: Summary, titles: Mapping[str, str]) -> FoundTable |
         what = (title, case, TARGETS[condition.target])
         lines.append((*what, percent(condition.rate.mean), *control_cells(condition)))
     if not lines:
-        return None
-    return FoundTable(
+        return []
+    table = FoundTable(
         id="controls",
         title="Controls",
         header=("trade-off", "case", "recognises", "recognised", *CONTROLS.values()),
@@ -88,6 +86,7 @@ def _controls_table(summary: Summary, titles: Mapping[str, str]) -> FoundTable |
         "out whole bottles. There is no control by the order of recording, because simulated trials have none.",
         numbers=3,
     )
+    return [table]
 
 
 def _answer(reports: dict[str, _Report]) -> str:

@@ -110,7 +110,7 @@ def _stored(folder: str) -> Iterator[LabelledRecording | UnreadableRecording]:
 
 def _of_trial(grasp: StoredGrasp) -> LabelledRecording:
     return LabelledRecording(
-        recording=read_recorded(grasp.recording).recording(),
+        recording=read_recorded(grasp.recording, sha256=grasp.recording_sha256).recording(),
         source=f"trial {grasp.number}",
         label=grasp.label,
         instance=grasp.instance.partition("#")[2],

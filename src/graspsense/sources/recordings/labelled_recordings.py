@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
-import numpy as np
 from attrs import evolve
 
 from graspsense.core.components.roles import FeatureSet
@@ -28,7 +27,7 @@ from graspsense.recording.replayable import Recording, curve_bytes, grasp_number
 from graspsense.sources.manifest.alike import compared
 from graspsense.sources.recordings.dataset_recordings import failing_as, readable_or_not
 from graspsense.sources.recordings.noise_thresholds import THRESHOLDS, thresholds_for
-from graspsense.store.first_line import NAMES, UNITS, numbers_of
+from graspsense.store.first_line import first_line_table
 
 
 def labelled_recordings(
@@ -127,13 +126,8 @@ def order_of(facts: Sequence[LabelledRecording]) -> tuple[int, ...] | None:
 
 def _controls(table: FeatureTable, early: Sequence[Features], facts: Sequence[LabelledRecording]) -> Controls:
     """Return the controls: features from before contact, and the numbers of the first frame of each recording."""
-    opening = np.array([numbers_of(fact.recording.readings[0].frame) for fact in facts], dtype=np.float64)
-    opening[np.isinf(opening)] = np.nan
-    known_controls = controls(
-        table,
-        table_of(early),
-        first_line=FeatureTable(names=NAMES, units=UNITS, values=opening),
-    )
+    first_line = first_line_table(fact.recording.readings[0].frame for fact in facts)
+    known_controls = controls(table, table_of(early), first_line=first_line)
     return without_constant_gap(
         known_controls, (fact.recording.columns("gap_m")[0].tolist() for fact in facts)
     )
