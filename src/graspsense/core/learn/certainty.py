@@ -40,8 +40,7 @@ if TYPE_CHECKING:
 STEP_UNITS: Final = 30
 """Least number of units from which a rate is computed, if there are as many.
 
-The highest step is the luckiest: where the probability tells nothing, its rate is 2 points too high. With steps of 15
-units it would be 6.
+The highest step is the luckiest, and the more so the fewer units it has.
 """
 STEP_SHARE: Final = 0.02
 """Least share of all units from which a rate is computed: more units give more exact rates, and not more of them."""
@@ -52,18 +51,14 @@ LABEL_UNITS: Final = 5
 LABEL_WEIGHT: Final = 7.0
 """Number of independent answers that weigh as much as what is known of a label without its own answers.
 
-Over simulated tables, the true rate of a label rises by n / (n + 11) of that of n cross-validated answers, which tell
-as much as half as many independent ones: that would be 5. The labels that are told to be surest are the luckiest ones.
+The labels whose answers are most often right are the luckiest ones.
 """
 FURTHER_UNITS: Final = 3.0
 """Units whose answers are all alike that count beside those that are known, for the variance between units."""
 AS_RARE: Final = 2.0
 """Labels with at most this many times the answers of a label are as rare."""
 UNSEEN: Final = 0.005
-"""What each other label has besides its probability.
-
-Over 900 simulated grasps of 15 labels, the Brier score is 0.478 for c45 and 0.445 for knn; without it, 0.481 and 0.451.
-"""
+"""What each other label has besides its probability: a label without a training trial close by is not impossible."""
 SUPPORT_BOUNDS: Final = (5.0, 10.0, 20.0, 40.0, 80.0)
 """Numbers of training trials at which a class of support may begin."""
 _ROUNDING: Final = 1e-9
