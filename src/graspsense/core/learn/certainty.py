@@ -42,8 +42,6 @@ STEP_UNITS: Final = 30
 
 The highest step is the luckiest, and the more so the fewer units it has.
 """
-STEP_SHARE: Final = 0.02
-"""Least share of all units from which a rate is computed: more units give more exact rates, and not more of them."""
 CLASS_UNITS: Final = 60
 """Least number of units in a class of support, if there are as many."""
 LABEL_UNITS: Final = 5
@@ -236,23 +234,13 @@ def certainty_of(
     known, labels = np.nan_to_num(answers.support, nan=0.0), np.array(answers.predicted)
     correct = np.array(right, dtype=np.float64)
     effect *= _alike(np.bincount(unit_of, weights * correct).astype(np.float64))
-    least_units = max(STEP_UNITS, STEP_SHARE * float(weights.sum()))
     guessing = 1.0 / max(len(set(labels.tolist())), 2)
     edges = [0.0, *_begins(known, weights, SUPPORT_BOUNDS, CLASS_UNITS), np.inf]
     classes = []
     for least, end in pairwise(edges):
         rows = (known >= least) & (known < end)
-        begins, rates, intervals = _steps(
-            answers.shares[rows], correct[rows], weights[rows], least_units, effect, guessing
-        )
         classes.append(
-            SupportClass(
-                least=least,
-                probabilities=begins,
-                rates=rates,
-                units=float(weights[rows].sum()),
-                intervals=intervals,
-            )
+            _support_class(least, answers.shares[rows], correct[rows], weights[rows], effect, guessing)
         )
     of_all = Certainty(classes=tuple(classes))
     return evolve(of_all, of_label=_shares(labels, correct, of_all.rate(answers), weights / effect, effect))
@@ -347,21 +335,21 @@ def _begins(
     return begins
 
 
-def _steps(
+def _support_class(
+    least: float,
     probability: NDArray[np.float64],
     right: NDArray[np.float64],
     weights: NDArray[np.float64],
-    least_units: float,
     effect: float,
     guessing: float,
-) -> tuple[tuple[float, ...], tuple[float, ...], tuple[tuple[float, float], ...]]:
-    """Return where the steps of the isotonic regression begin, their rates, and the intervals of these."""
+) -> SupportClass:
+    """Return the class of support that these answers make: the steps of the isotonic regression, with intervals."""
     from scipy.optimize import isotonic_regression
     from scipy.special import betaincinv
 
     probability = np.round(probability, 9)
     values = np.unique(probability)
-    edges = [float(values[0]), *_begins(probability, weights, values.tolist(), least_units)]
+    edges = [float(values[0]), *_begins(probability, weights, values.tolist(), STEP_UNITS)]
     bins = np.searchsorted(edges[1:], probability, side="right")
     all_of, right_of = np.bincount(bins, weights), np.bincount(bins, weights * right)
     rising = isotonic_regression(right_of / all_of, weights=all_of).x
@@ -378,5 +366,10 @@ def _steps(
     # Two answers more, one of them right, leave none certain; they make no guess among several labels surer.
     rates = np.maximum.accumulate(np.minimum((units * drawn + 1.0) / (units + 2.0), drawn))
     ends = (betaincinv(rates * (units + 2.0), (1.0 - rates) * (units + 2.0), end) for end in (0.025, 0.975))
-    begins = (edges[number] for number in first_of.tolist())
-    return tuple(begins), tuple(rates.tolist()), tuple(zip(*(end.tolist() for end in ends), strict=True))
+    return SupportClass(
+        least=least,
+        probabilities=tuple(edges[number] for number in first_of.tolist()),
+        rates=tuple(rates.tolist()),
+        units=float(weights.sum()),
+        intervals=tuple(zip(*(end.tolist() for end in ends), strict=True)),
+    )
