@@ -400,7 +400,6 @@ def test_the_interval_of_a_certainty_holds_for_new_answers_and_its_highest_is_no
             held += [low <= rate_of(fresh[rests_on_as_much]).mean() <= high] * int(rests_on_as_much.sum())
     # 95 % are asked for.
     assert np.mean(held) > 0.92
-    # Chance alone makes the highest of several rates higher, by 6 points if they were not drawn together.
     assert np.mean(highest) < rate_of(np.ones(1))[0] + 0.03
 
 

@@ -18,6 +18,8 @@ from graspsense.evaluation.results import Measurement
 
 PERMUTATIONS: Final = 19
 """Number of permutations of the labels: the smallest with which p can be 0.05."""
+EARLY: Final = {"before_contact": "before contact", "first_line": "the first line of the recording"}
+"""The controls with features from before the squeeze, and from when these are."""
 
 
 class ControlMeasurements:
@@ -151,10 +153,7 @@ class ControlMeasurements:
     def _warn_of_early_recognition(
         self, controls: Mapping[str, Measurement], majority_correct: Sequence[bool]
     ) -> None:
-        for name, when in (
-            ("before_contact", "before contact"),
-            ("first_line", "the first line of the recording"),
-        ):
+        for name, when in EARLY.items():
             control = controls.get(name)
             if control is None or control.rate is None:
                 continue

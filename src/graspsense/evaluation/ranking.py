@@ -32,9 +32,8 @@ from graspsense.evaluation.folds import (
 )
 from graspsense.evaluation.gathered_warnings import gathered_warnings
 from graspsense.evaluation.intervals import Difference, RecognitionRate, difference, rate_among, rate_of
+from graspsense.evaluation.over_seeds import MARGIN
 
-MARGIN: Final = 0.02
-"""Largest loss of rate with which a candidate counts as equivalent to the best."""
 BEFORE_CONTACT: Final = "before_contact"
 
 Standing = Literal["best", "equivalent", "undecided", "worse", "control"]

@@ -17,6 +17,7 @@ from graspsense.core.learn.conformal import COVERAGE
 from graspsense.core.learn.labelled import ControlFeatures, Labelled
 from graspsense.core.values.errors import ConfigError, counted
 from graspsense.core.values.units import with_unit
+from graspsense.evaluation.controls import EARLY
 from graspsense.evaluation.evaluator import Progress
 from graspsense.evaluation.folds import (
     Folds,
@@ -230,10 +231,7 @@ class _Evaluator:
         unit, texts = self.trials.value.unit if self.trials.value is not None else "", []
         if not _is_worse(self.controls["mean_only"]):
             texts.append("the error is not shown to be below that of always predicting the mean")
-        for name, when in (
-            ("before_contact", "before contact"),
-            ("first_line", "the first line of the recording"),
-        ):
+        for name, when in EARLY.items():
             held = self.held_out.get(name)
             if held is not None and self._difference(self.mean, held).is_positive:
                 texts.append(

@@ -1,9 +1,8 @@
 """Prediction intervals of numbers, from held-out errors of predictions that are as large (Mondrian conformal).
 
-An interval of one width for all predictions holds on average and not where it matters: where errors grow with the
-number, as those of a mass do, large predictions were inside of a 90 % interval in 40 % of cases. So the held-out trials
-are divided into bands by their prediction, each with enough units, and a prediction has the width of its band (H.
-Boström and U. Johansson, Proc. Mach. Learn. Res. 128 (2020) 24).
+An interval of one width for all predictions holds on average and not where errors grow with the number, as those of a
+mass do. So the held-out trials are divided into bands by their prediction, each with enough units, and a prediction has
+the width of its band (H. Boström and U. Johansson, Proc. Mach. Learn. Res. 128 (2020) 24).
 """
 
 from __future__ import annotations

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from graspsense.evaluation.intervals import percent
-from graspsense.evaluation.ranking import MARGIN, Candidate, Ranking
+from graspsense.evaluation.over_seeds import MARGIN
+from graspsense.evaluation.ranking import Candidate, Ranking
 from graspsense.report.found_table import FoundTable
 from graspsense.report.html import Page, Section, bullets, facts, pair, paragraph
 from graspsense.report.rates import RateRow, rates_picture

@@ -40,11 +40,8 @@ if TYPE_CHECKING:
 STEP_UNITS: Final = 30
 """Least number of units from which a rate is computed, if there are as many.
 
-The highest step is the luckiest: where the probability tells nothing, its rate is 2 points too high. With steps of 15
-units it would be 6.
+The highest step is the luckiest, and the more so the fewer units it has.
 """
-STEP_SHARE: Final = 0.02
-"""Least share of all units from which a rate is computed: more units give more exact rates, and not more of them."""
 CLASS_UNITS: Final = 60
 """Least number of units in a class of support, if there are as many."""
 LABEL_UNITS: Final = 5
@@ -52,18 +49,14 @@ LABEL_UNITS: Final = 5
 LABEL_WEIGHT: Final = 7.0
 """Number of independent answers that weigh as much as what is known of a label without its own answers.
 
-Over simulated tables, the true rate of a label rises by n / (n + 11) of that of n cross-validated answers, which tell
-as much as half as many independent ones: that would be 5. The labels that are told to be surest are the luckiest ones.
+The labels whose answers are most often right are the luckiest ones.
 """
 FURTHER_UNITS: Final = 3.0
 """Units whose answers are all alike that count beside those that are known, for the variance between units."""
 AS_RARE: Final = 2.0
 """Labels with at most this many times the answers of a label are as rare."""
 UNSEEN: Final = 0.005
-"""What each other label has besides its probability.
-
-Over 900 simulated grasps of 15 labels, the Brier score is 0.478 for c45 and 0.445 for knn; without it, 0.481 and 0.451.
-"""
+"""What each other label has besides its probability: a label without a training trial close by is not impossible."""
 SUPPORT_BOUNDS: Final = (5.0, 10.0, 20.0, 40.0, 80.0)
 """Numbers of training trials at which a class of support may begin."""
 _ROUNDING: Final = 1e-9
@@ -241,23 +234,13 @@ def certainty_of(
     known, labels = np.nan_to_num(answers.support, nan=0.0), np.array(answers.predicted)
     correct = np.array(right, dtype=np.float64)
     effect *= _alike(np.bincount(unit_of, weights * correct).astype(np.float64))
-    least_units = max(STEP_UNITS, STEP_SHARE * float(weights.sum()))
     guessing = 1.0 / max(len(set(labels.tolist())), 2)
     edges = [0.0, *_begins(known, weights, SUPPORT_BOUNDS, CLASS_UNITS), np.inf]
     classes = []
     for least, end in pairwise(edges):
         rows = (known >= least) & (known < end)
-        begins, rates, intervals = _steps(
-            answers.shares[rows], correct[rows], weights[rows], least_units, effect, guessing
-        )
         classes.append(
-            SupportClass(
-                least=least,
-                probabilities=begins,
-                rates=rates,
-                units=float(weights[rows].sum()),
-                intervals=intervals,
-            )
+            _support_class(least, answers.shares[rows], correct[rows], weights[rows], effect, guessing)
         )
     of_all = Certainty(classes=tuple(classes))
     return evolve(of_all, of_label=_shares(labels, correct, of_all.rate(answers), weights / effect, effect))
@@ -352,21 +335,21 @@ def _begins(
     return begins
 
 
-def _steps(
+def _support_class(
+    least: float,
     probability: NDArray[np.float64],
     right: NDArray[np.float64],
     weights: NDArray[np.float64],
-    least_units: float,
     effect: float,
     guessing: float,
-) -> tuple[tuple[float, ...], tuple[float, ...], tuple[tuple[float, float], ...]]:
-    """Return where the steps of the isotonic regression begin, their rates, and the intervals of these."""
+) -> SupportClass:
+    """Return the class of support that these answers make: the steps of the isotonic regression, with intervals."""
     from scipy.optimize import isotonic_regression
     from scipy.special import betaincinv
 
     probability = np.round(probability, 9)
     values = np.unique(probability)
-    edges = [float(values[0]), *_begins(probability, weights, values.tolist(), least_units)]
+    edges = [float(values[0]), *_begins(probability, weights, values.tolist(), STEP_UNITS)]
     bins = np.searchsorted(edges[1:], probability, side="right")
     all_of, right_of = np.bincount(bins, weights), np.bincount(bins, weights * right)
     rising = isotonic_regression(right_of / all_of, weights=all_of).x
@@ -383,5 +366,10 @@ def _steps(
     # Two answers more, one of them right, leave none certain; they make no guess among several labels surer.
     rates = np.maximum.accumulate(np.minimum((units * drawn + 1.0) / (units + 2.0), drawn))
     ends = (betaincinv(rates * (units + 2.0), (1.0 - rates) * (units + 2.0), end) for end in (0.025, 0.975))
-    begins = (edges[number] for number in first_of.tolist())
-    return tuple(begins), tuple(rates.tolist()), tuple(zip(*(end.tolist() for end in ends), strict=True))
+    return SupportClass(
+        least=least,
+        probabilities=tuple(edges[number] for number in first_of.tolist()),
+        rates=tuple(rates.tolist()),
+        units=float(weights.sum()),
+        intervals=tuple(zip(*(end.tolist() for end in ends), strict=True)),
+    )

@@ -16,7 +16,7 @@ import numpy as np
 
 from graspsense.core.components.caller import option
 from graspsense.core.learn.conformal import exchangeable_instances
-from graspsense.core.learn.groups import beyond_chance, means_of
+from graspsense.core.learn.groups import beyond_chance, is_sorted, means_of
 
 if TYPE_CHECKING:
     from graspsense.core.learn.labelled import Labelled
@@ -25,6 +25,8 @@ LEAST_LINES: Final = 5
 """Trials from which on their values can show more than chance."""
 _IN_TURNS: Final = 1.5
 """Mean number of equal stretches of a label above which labels are in turns: two of each, or of more than half."""
+_BLOCKS: Final = 10
+"""Blocks of each label, in time, in which its trials count, and most values of a feature that was set."""
 _DRIFT: Final = 5.0
 """Standard deviations by which features follow the time within all labels more than in random order, if they drift."""
 
@@ -41,13 +43,21 @@ def confounded(labelled: Labelled) -> str:
                 f"all trials of a label have the same {name}: which of both is recognised cannot be told. Record each "
                 f"label with several; a feature can be left out ({option('features', '-NAME', python='columns')})"
             )
-    named = None if labelled.grouped else exchangeable_instances(labelled)
-    if _in_stretches(labelled) and (named is None or _drifts(labelled, named)):
-        objects = "" if named else f"name several objects of each ({option('instance', 'COLUMN')}), "
+    if labelled.order is None:
+        return ""
+    in_time = labelled.rows(np.argsort(np.array(labelled.order), kind="stable"))
+    sorted_later = f"state the order of a table that was sorted later ({option('order', 'COLUMN')})"
+    if (labelled.grouped or exchangeable_instances(labelled) is None) and _in_stretches(in_time.labels):
         return (
             "each label was recorded in one stretch, or nearly: whether it is recognised by its object, or by what "
             "changed from one stretch to the next, as a drift or a mounting, cannot be told. Record the labels in "
-            f"turns, {objects}or state the order of a table that was sorted later ({option('order', 'COLUMN')})"
+            f"turns, name several objects of each ({option('instance', 'COLUMN')}), or {sorted_later}"
+        )
+    if _drifts(in_time):
+        return (
+            "the features of all labels follow the time alike, as those of a sensor that drifts: how often later "
+            "grasps are recognised cannot be told. Remove the drift, record in several sessions and name them "
+            f"({option('instance', 'COLUMN')}), or {sorted_later}"
         )
     return ""
 
@@ -63,15 +73,12 @@ def says_the_label(values: Sequence[Hashable], labels: Sequence[str]) -> bool:
     return 1 < different <= len(pairs) == among < len(labels) and not few
 
 
-def _in_stretches(labelled: Labelled) -> bool:
-    """Return whether each label is one block in the order of recording, or nearly, as far as that is known.
+def _in_stretches(in_time: Sequence[str]) -> bool:
+    """Return whether each of these labels, in the order of recording, is one block, or nearly.
 
     A label counts as in as many equal stretches as 1 over the sum of the squares of their shares (M. O. Hill, Ecology
     54 (1973) 427): a grasp apart from its others hardly makes a second one. A label with one trial shows nothing.
     """
-    if labelled.order is None or labelled.provenance.get("simulated"):
-        return False
-    in_time = [labelled.labels[row] for row in np.argsort(labelled.order, kind="stable").tolist()]
     trials = Counter(in_time)
     squares = dict.fromkeys((label for label, n in trials.items() if n > 1), 0.0)
     for label, stretch in groupby(label for label in in_time if label in squares):
@@ -79,16 +86,20 @@ def _in_stretches(labelled: Labelled) -> bool:
     return len(squares) > 1 and sum(1.0 / share for share in squares.values()) <= _IN_TURNS * len(squares)
 
 
-def _drifts(labelled: Labelled, instances: Sequence[str]) -> bool:
-    """Return whether the features follow the time within all labels alike. Trials of one instance are as one."""
-    order = np.argsort(np.array(labelled.order), kind="stable")
-    in_time = labelled.rows(order)
-    units = [*zip(in_time.labels, np.array(instances)[order], strict=True)]
-    _, begins, unit_of = np.unique(units, axis=0, return_index=True, return_inverse=True)
-    place_of = np.argsort(np.argsort(begins))[unit_of.ravel()]
-    rows = np.argsort(place_of, kind="stable")
-    means = means_of(in_time.table.values[rows], place_of[rows])
-    sizes = [len(list(run)) for _, run in groupby(np.array(in_time.labels)[np.sort(begins)])]
-    codes = np.repeat(np.arange(len(sizes)), sizes)
-    time = np.concatenate([np.linspace(-0.5, 0.5, size) for size in sizes])
-    return beyond_chance(means, codes, lambda ranks: float(((time @ ranks) ** 2).sum())) > _DRIFT
+def _drifts(in_time: Labelled) -> bool:
+    """Return whether the features of these trials, in the order of recording, follow the time within all labels alike.
+
+    Trials of a label count in blocks: neighbours may be of one object. Features with few values were set, not measured.
+    """
+    labels = np.array(in_time.labels)
+    parts = [np.array_split(np.flatnonzero(labels == name), _BLOCKS) for name in in_time.classes]
+    blocks = [block for of_label in parts for block in of_label if len(block)]
+    values = in_time.table.values[np.concatenate(blocks)]
+    values = values[:, [len(np.unique(column)) > _BLOCKS for column in values.T]]
+    block_of = np.repeat(np.arange(len(blocks)), [len(block) for block in blocks])
+    codes = np.unique([labels[block[0]] for block in blocks], return_inverse=True)[1]
+    times = np.array([block.mean() for block in blocks])
+    drift = beyond_chance(
+        means_of(values, block_of), codes, lambda ranks: float(((times @ ranks) ** 2).sum())
+    )
+    return drift > _DRIFT and not is_sorted(values, codes[block_of])

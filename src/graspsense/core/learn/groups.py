@@ -273,7 +273,7 @@ def _blocks(labelled: Labelled) -> tuple[str, Numbers]:
     def within_stretches(ranks: Values) -> float:
         return float((np.add.reduceat(ranks, begins, axis=0) ** 2 / trials).sum())
 
-    limit = np.inf if _is_sorted(values, codes) else _ALIKE
+    limit = np.inf if is_sorted(values, codes) else _ALIKE
     stretches = beyond_chance(values, codes, within_stretches) > limit
     unit_of = np.repeat(np.arange(len(begins)), trials.ravel()) if stretches else np.arange(len(codes))
     of_unit = codes[np.unique(unit_of, return_index=True)[1]]
@@ -293,7 +293,7 @@ def _blocks(labelled: Labelled) -> tuple[str, Numbers]:
     return f"Blocks of {length}" if length > 1 else "", result
 
 
-def _is_sorted(values: Values, codes: Numbers) -> bool:
+def is_sorted(values: Values, codes: Numbers) -> bool:
     """Return whether measured values of a feature rise, or fall, within every label: no trials are recorded so."""
     within = codes[1:] == codes[:-1]
     steps = np.diff(values, axis=0)[within]

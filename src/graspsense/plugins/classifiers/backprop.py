@@ -117,7 +117,7 @@ def hidden_units(config: BackpropConfig, features: int, labels: int) -> int:
 
 @cache
 def _training() -> Callable[..., Any]:
-    """Return `train`, compiled if numba is installed; the interpreter needs about two seconds for 200 trials."""
+    """Return `train`, compiled if numba is installed, since the interpreter takes much longer."""
     try:
         compiled = compile_function(train)
     except NotCompilable:
