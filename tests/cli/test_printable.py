@@ -32,6 +32,7 @@ def acts(text):
     return re.findall(kinds, text)
 
 
+@pytest.mark.slow
 @given(st.text())
 def test_nothing_that_acts_is_printed_and_the_rest_stays(text):
     assert acts(printable(text)) == []

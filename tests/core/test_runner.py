@@ -182,6 +182,7 @@ def fail(*values, error=ZeroDivisionError):
     raise error
 
 
+@pytest.mark.slow
 @every_case(
     ("error", "reason"),
     [
@@ -391,6 +392,7 @@ def test_other_ends_of_a_session_let_go_too_and_tell_who_listened_before(number)
     assert (grasp.outcome, heard, let_go(gripper)) == (Outcome.ABORTED, [number], True)
 
 
+@pytest.mark.slow
 @every_case(("stops_s", "outcome"), [(1.2, Outcome.ABORTED), (1.82, Outcome.STEADY)])
 def test_a_device_whose_clock_stands_still_does_not_squeeze_nor_open_for_ever(stops_s, outcome):
     stopped = with_frame(

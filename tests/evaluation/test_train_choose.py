@@ -101,6 +101,7 @@ def test_components_that_are_given_stay_run_on_a_recording_and_are_not_replaced(
     assert "own.toml" in refused("train", store, "--choose", *given, "--out", tmp_path / "own.json")
 
 
+@pytest.mark.slow
 def test_a_file_of_another_kind_beside_the_model_is_never_replaced(store, tmp_path):
     (tmp_path / "m.toml").write_text(MANIFEST)
     assert "manifest" in refused("train", store, "--choose", "--overwrite", "--out", tmp_path / "m.json")

@@ -61,6 +61,7 @@ def table(path, seed, separation):
     path.write_text("what,w [m]\n" + "\n".join(lines) + "\n")
 
 
+@pytest.mark.slow
 def test_a_replaced_table_is_evaluated_anew_and_it_is_said(tmp_path):
     table(tmp_path / "t.csv", 1, 50.0)
     file, results = experiment(tmp_path, "t.csv"), Results(tmp_path / "out")
@@ -457,6 +458,7 @@ def test_what_is_no_file_is_no_input():
     }
 
 
+@pytest.mark.slow
 @every_case(
     ("sweep", "key"),
     [

@@ -91,6 +91,7 @@ def test_an_experiment_is_a_file_and_ends_in_a_page(whole):
     assert len(results_in(folder)) == 4
 
 
+@pytest.mark.slow
 def test_what_lies_beside_the_results_gives_the_same_again(whole, tmp_path):
     folder, _ = whole
     assert "mine.toml" not in (folder / "experiment.toml").read_text(), (
@@ -392,6 +393,7 @@ def test_pipelines_of_any_name_stay_in_the_folder_and_are_found_again(file, tmp_
     assert len(summarise(results.experiment(), results).results) == 2
 
 
+@pytest.mark.slow
 @every_case(
     "content",
     ["[]", "3", '{"inputs": 3}', '{"git": "x", "versions": 4}', '{"git": {"graspsense": 3}, "inputs": [1]}'],

@@ -152,6 +152,7 @@ def test_an_expected_failure_is_no_failure_and_an_unexpected_pass_is_one():
     assert "expected failures" in passing.text
 
 
+@pytest.mark.slow
 def test_one_part_is_found_by_name_and_a_wrong_name_by_likeness():
     class Plugin:
         GRASPSENSE_API = (2, 0)

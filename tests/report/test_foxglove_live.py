@@ -126,6 +126,7 @@ def check_complete(messages, n=20):
     assert len(messages["/grasp/signals/sound"]) == len(messages["/grasp/scalars"]) == n
 
 
+@pytest.mark.slow
 def test_viewers_receive_the_messages_and_schemas_of_the_recording_and_late_ones_too(feed, tmp_path):
     settings = load_pipeline(options=["classifier.type=none", "gripper.rate_hz=250"]).settings
     early = Viewer(feed)

@@ -278,6 +278,7 @@ def boxes(folder, newtons=0.15):
             write(folder, f"{label}_{order}", force(*kicks, level=level)[:lasting], slips[:lasting])
 
 
+@pytest.mark.slow
 def test_slips_of_a_force_are_found_and_what_cannot_be_told_is_said(tmp_path):
     boxes(tmp_path)
     path = manifest(tmp_path, events='events = { slip = "slip", jump = "slip" }')

@@ -74,6 +74,7 @@ def test_an_array_that_the_features_do_not_name_is_told_with_the_options_that_ch
     assert done.exit_code == 0, done.output + words
 
 
+@pytest.mark.slow
 def test_recordings_that_have_the_array_are_imported_and_the_others_told(tmp_path):
     whole, without = manifest(tmp_path, "whole"), manifest(tmp_path, "without", palm=False)
     done, words = ran(

@@ -251,6 +251,7 @@ def test_backend_tells_a_force_that_is_the_same_all_along(tmp_path: Path) -> Non
     assert not [note for note in info.notes if "right pad does" in note]
 
 
+@pytest.mark.slow
 @real_data
 def test_every_file_of_the_data_set_reads() -> None:
     folder = Path(os.environ["GRASPSENSE_ICUB"])

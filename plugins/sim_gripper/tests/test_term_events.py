@@ -206,6 +206,7 @@ def test_a_force_that_is_not_finite_ends_the_grasp_with_the_name_of_the_term(stu
     assert done.end() is done.end()  # computed once: its buffers are used again
 
 
+@pytest.mark.slow
 def test_a_single_grasp_names_the_term_too(stuff):
     options = ["--json", "-o", "gripper.open_gap_m=0.052"]
     shown = CliRunner().invoke(cli, ["run", "--object", stuff("nan"), *options])
