@@ -371,6 +371,7 @@ def test_a_law_for_cells_of_another_type_does_not_fit(seen):
         wiring.check(load_pipeline(options=options, plugins=plugins).settings)
 
 
+@pytest.mark.slow
 def test_a_law_keeps_a_reference_image():
     ended = run_grasp(Eyes(NoKeys()), Watching(NoKeys()), RunConfig())
     assert ended.outcome is Outcome.STEADY
@@ -394,6 +395,7 @@ def test_pictures_for_foxglove_have_the_colours_of_the_camera(seen):
     assert b"rgb8" in messages[0]
 
 
+@pytest.mark.slow
 def test_a_camera_is_a_small_picture_in_the_report():
     import base64
     import zlib

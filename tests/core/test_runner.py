@@ -228,6 +228,7 @@ def test_a_grasp_that_is_interrupted_while_the_fingers_open_keeps_its_outcome(ti
     assert let_go(gripper)
 
 
+@pytest.mark.slow
 def test_a_step_that_fails_or_returns_no_command_is_named_with_what_it_returns():
     def ends_in(command, state, phase, outcome):
         return command, state._replace(phase=phase, outcome=int(outcome))
@@ -288,6 +289,7 @@ class Recorded(Scripted):
         return super().read(timeout_s)
 
 
+@pytest.mark.slow
 @every_case(
     ("length", "outcome"),
     [
@@ -538,6 +540,7 @@ def pushing(effort_limit_n):
     return law(VELOCITY)
 
 
+@pytest.mark.slow
 @every_case("force_n", [15.0, 60.0])
 def test_a_squeeze_under_the_limits_of_a_first_use_is_told(force_n):
     """Without pads these are equal grasps, and nobody is to call them equally good."""

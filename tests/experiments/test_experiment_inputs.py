@@ -157,6 +157,7 @@ def test_a_result_of_an_older_form_is_computed_again(tmp_path):
     assert rate_of(planned, results) == (1.0, 40)
 
 
+@pytest.mark.slow
 def test_a_comparison_names_the_inputs_whose_content_differs(tmp_path):
     file = experiment(tmp_path, "t.csv")
     for seed, name in enumerate(("a", "b", "c")):
@@ -503,6 +504,7 @@ def test_a_sweep_that_a_table_depends_on_is_planned(tmp_path, sweep, tasks):
     assert len({task.key for task in planned.tasks()}) == tasks
 
 
+@pytest.mark.slow
 @every_case(
     ("sweep", "alike"),
     [('"judge.grasps" = [0, 3]', [["grasps 0", "grasps 3"]]), ('"judge.folds" = [2, 3]', [])],

@@ -31,6 +31,8 @@ def short_openings(monkeypatch):
 SLOW_CHECKS = {
     "ends-every-grasp",
     "read-returns-within-its-timeout",
+    "same-features-elsewhere",
+    "same-model-elsewhere",
     "what-it-delivers-is-kept",
     "squeezes-with-what-it-is-asked",
     "says-what-it-asks-for",

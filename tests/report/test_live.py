@@ -202,6 +202,7 @@ def _rest(connection):
     return n
 
 
+@pytest.mark.slow
 @every_case(("option", "address"), [("--live-address", "127.0.0.1:{}"), ("--foxglove", "{}")])
 def test_a_port_that_is_taken_is_an_error_before_the_grasp(tmp_path, option, address):
     with socket.socket() as taken:

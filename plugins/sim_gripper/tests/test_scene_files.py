@@ -196,6 +196,7 @@ def explained(name, seed=0):
     return run_grasp(SimBackend(SimConfig(object=name, explain=True)), HYBRID, RunConfig(seed=seed))
 
 
+@pytest.mark.slow
 def test_the_explanation_adds_up_to_the_force_that_was_felt():
     grasp = explained("odwalla:full_closed", seed=3)
     model = grasp.report["model"]

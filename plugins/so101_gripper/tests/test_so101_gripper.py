@@ -237,6 +237,7 @@ def test_a_late_or_repeated_reply_is_not_taken_for_that_of_the_next_request(emul
     bus.close()
 
 
+@pytest.mark.slow
 @every_case(
     ("keys", "emulator", "why"),
     [
