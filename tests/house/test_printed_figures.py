@@ -146,7 +146,7 @@ def test_a_comparison_of_classifiers_is_the_one_of_today(options, classifiers, f
 @pytest.mark.slow
 @every_case("part", ["speed", "squeezes", "physics", "accuracy"])
 def test_a_trade_off_is_the_one_of_today(tmp_path, part):
-    printed("tradeoff", part, "-o", "seeds=4", "--out", tmp_path)
+    printed("tradeoff", part, "-o", "seeds=4", "--executor", "serial", "--out", tmp_path)
     today = (tmp_path / "report.md").read_text()
     cases = [line.strip("| ").split(" | ")[:2] for line in today.splitlines() if PERCENTAGE.search(line)]
     tabled = [case for case in cases if len(case) == 2]
@@ -218,7 +218,8 @@ def test_what_a_gripper_tells_apart_is_the_figure_of_today(tmp_path):
     alone = [part for part in variants if 'name = "Robotiq 2F-85"\n' in part or part.startswith("[data]")]
     assert len(alone) == 2
     (tmp_path / "alone.toml").write_text("".join([head, *alone]))
-    today = printed("experiment", tmp_path / "alone.toml", "--out", tmp_path / "results")
+    asked = ("--executor", "serial", "--out", tmp_path / "results")
+    today = printed("experiment", tmp_path / "alone.toml", *asked)
     told = rates(row(page("which_gripper"), "Robotiq 2F-85"))
     # Another rounding may turn a grasp of 71 into a copy of another, or change its answer.
     for target, share in (("both", told[0]), ("class", told[2])):
