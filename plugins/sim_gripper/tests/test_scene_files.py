@@ -1,6 +1,5 @@
 """Scenes of one's own: read strictly, held fast or free, explained, and with terms of somebody else's."""
 
-import json
 import math
 from typing import NamedTuple
 
@@ -8,10 +7,9 @@ import numpy as np
 import pytest
 from batches import run_many
 from cases import every_case
-from click.testing import CliRunner
+from commands import answered, printed
 from unverified import sample, unverified_setup
 
-from graspsense.cli.main import cli
 from graspsense.core.components.registry import IsolatedPlugins
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.runner import run_grasp
@@ -224,14 +222,13 @@ def test_the_explanation_leaves_out_what_happens_in_a_released_object():
 
 @pytest.mark.slow
 def test_run_explains_the_model_in_the_terminal_and_in_json():
-    shown = CliRunner().invoke(cli, ["run", "--object", "leaking_bottle", "-o", "gripper.explain=true"])
-    assert shown.exit_code == 0
-    table = shown.output[shown.output.index("model       peak force 1") :].splitlines()
+    shown = printed("run", "--object", "leaking_bottle", "-o", "gripper.explain=true")
+    table = shown[shown.index("model       peak force 1") :].splitlines()
     assert table[1].split()[:2] == ["TERM", "PEAK"]
     assert [line.split()[0] for line in table[2:4]] == ["elastic", "gas"]
     assert "relaxes in 5 s" in table[3]
-    none = CliRunner().invoke(cli, ["run", "--object", "none", "--explain-model", "--json"])
-    assert json.loads(none.stdout)["report"]["model"] == {"touched": False, "terms": [], "without": []}
+    none = answered("run", "--object", "none", "--explain-model")
+    assert none["report"]["model"] == {"touched": False, "terms": [], "without": []}
 
 
 # ---------------------------------------------------------------------------------- somebody else's term
