@@ -1,7 +1,6 @@
 """Labels that cannot be told from how their trials were recorded have no certainty; others do."""
 
 import numpy as np
-import pytest
 from attrs import evolve
 from cases import every_case
 from test_conformal import model_of
@@ -20,7 +19,6 @@ def drifting(numbers, slope, rng):
     return table_of(numbers, values, order=tuple(range(len(numbers))))
 
 
-@pytest.mark.slow
 def test_a_setting_that_comes_with_the_label_leaves_no_certainty_as_a_feature_and_beside_the_features():
     rng = np.random.default_rng(1)
     numbers = rng.permutation(np.repeat(np.arange(3), 20))

@@ -371,7 +371,6 @@ def test_a_law_for_cells_of_another_type_does_not_fit(seen):
         wiring.check(load_pipeline(options=options, plugins=plugins).settings)
 
 
-@pytest.mark.slow
 def test_a_law_keeps_a_reference_image():
     ended = run_grasp(Eyes(NoKeys()), Watching(NoKeys()), RunConfig())
     assert ended.outcome is Outcome.STEADY

@@ -394,7 +394,6 @@ def test_other_ends_of_a_session_let_go_too_and_tell_who_listened_before(number)
     assert (grasp.outcome, heard, let_go(gripper)) == (Outcome.ABORTED, [number], True)
 
 
-@pytest.mark.slow
 @every_case(("stops_s", "outcome"), [(1.2, Outcome.ABORTED), (1.82, Outcome.STEADY)])
 def test_a_device_whose_clock_stands_still_does_not_squeeze_nor_open_for_ever(stops_s, outcome):
     stopped = with_frame(
@@ -540,7 +539,6 @@ def pushing(effort_limit_n):
     return law(VELOCITY)
 
 
-@pytest.mark.slow
 @every_case("force_n", [15.0, 60.0])
 def test_a_squeeze_under_the_limits_of_a_first_use_is_told(force_n):
     """Without pads these are equal grasps, and nobody is to call them equally good."""

@@ -120,7 +120,6 @@ def stopped(recorder):
         os.kill(recorder._process.pid, signal.SIGCONT)
 
 
-@pytest.mark.slow
 def test_a_writer_that_does_not_follow_holds_nobody_up_and_loses_nothing(tmp_path):
     """Every message is kept and written once it goes on."""
     recorder = Recorder(tmp_path / "g.mcap")

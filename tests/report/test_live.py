@@ -12,7 +12,7 @@ from urllib.request import Request, urlopen
 
 import click
 import pytest
-from commands import graspsense
+from commands import graspsense, printed
 from live_grasp import COMMAND, device, port_of, reading, shown
 
 from graspsense.cli.live import _host_and_port
@@ -200,7 +200,6 @@ def _rest(connection):
     return n
 
 
-@pytest.mark.slow
 @every_case(("option", "address"), [("--live-address", "127.0.0.1:{}"), ("--foxglove", "{}")])
 def test_a_port_that_is_taken_is_an_error_before_the_grasp(tmp_path, option, address):
     with socket.socket() as taken:
@@ -253,9 +252,7 @@ def test_a_trial_is_stored_as_without_a_page(tmp_path):
     shown_by = ["--live", "--foxglove", "--rerun", str(tmp_path / "grasp.rrd")]
     for name, live in (("with", shown_by), ("without", [])):
         asked = ["run", "--save", str(tmp_path / name), "--seed", "3", "--json", *live]
-        done = graspsense(*asked)
-        assert done.returncode == 0, done.stderr
-        said.append(json.loads(done.stdout))
+        said.append(json.loads(printed(*asked)))
     for line in said:
         del line["seconds_wall"], line["kept"]["store"]
     assert said[0] == said[1]

@@ -48,7 +48,6 @@ def peak_n(recording):
     return max(reading.frame.force_left_n for reading in recording.recording.readings)
 
 
-@pytest.mark.slow
 def test_the_description_agrees_with_the_frames(written):
     said, rows = info(written[0]), frames(written[0])
     assert said["codebase_version"] == "v3.0"

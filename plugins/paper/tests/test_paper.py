@@ -75,7 +75,6 @@ def test_a_printed_rate_is_its_counts_or_a_note_says_what_is_wrong(rate):
     assert low <= rate.rate <= high
 
 
-@pytest.mark.slow
 def test_every_published_rate_has_an_experiment_with_a_case_for_it():
     planned = read_experiment("paper")
     assert len(planned.seeds) >= 20

@@ -138,7 +138,6 @@ def energy(params, state):
     return kinetic + 0.5 * stiffness * max(params.object.width_m - state.motion.gap_m, 0.0) ** 2
 
 
-@pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @given(powers(3.0, 5.5), st.floats(0.001, 0.2), st.floats(0.0, 10.0), st.floats(0.0, 1.0))
 def test_with_the_drive_off_stored_energy_never_rises(stiffness, speed, coulomb, load):
