@@ -116,6 +116,7 @@ def test_a_rate_of_trials_that_were_learned_from_has_no_interval_and_says_so(csv
     assert any("120 of 120 trials" in warning for warning in answer["warnings"])
 
 
+@pytest.mark.slow
 def test_a_rate_of_predictions_counts_the_objects_of_the_trials(csv, tmp_path):
     model, others = tmp_path / "mine.json", tmp_path / "others.csv"
     header, *lines = csv.read_text().splitlines()
@@ -164,6 +165,7 @@ def test_a_certainty_by_trials_is_said_to_be_that_of_the_same_objects(tmp_path):
         assert {"objects" in row["holds_for"] for row in predicted["predictions"]} == {of_same_objects}
 
 
+@pytest.mark.slow
 def test_a_model_of_states_or_classes(csv, tmp_path):
     model = tmp_path / "states.json"
     assert "--only: can, jar" in refused("train", csv, "--label", "what", "--out", model, "--target", "state")

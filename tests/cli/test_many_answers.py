@@ -55,6 +55,7 @@ def test_a_table_without_a_feature_of_the_model_is_refused(rows):
         trained(rows, "knn", ("a", "b", "c") * 80).answers(table(rows).columns(["p_first", "dp_dt"]))
 
 
+@pytest.mark.slow
 def test_predict_answers_many_without_reasons_and_says_so(rows, tmp_path):
     lines = ["label,p_first [m],f_steady [N],dp_dt [m/s]"]
     for k, row in enumerate(np.tile(rows, (5, 1)).tolist()):

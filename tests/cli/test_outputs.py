@@ -117,6 +117,7 @@ def experiment(table, tmp_path):
     return tmp_path / "out"
 
 
+@pytest.mark.slow
 def test_a_result_that_cannot_be_read_is_told(experiment, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     result, other, *_ = sorted((experiment / "results").glob("*.json"))

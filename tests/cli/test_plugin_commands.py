@@ -24,6 +24,7 @@ def test_a_part_that_conforms():
     assert err.count("passed   graspsense-test/peak") == count
 
 
+@pytest.mark.slow
 def test_a_part_that_does_not():
     broken_rule = ("feature-set", "requires-what-it-reads")
     broken, *_ = [mutant for mutant in MUTANTS if (mutant.role, mutant.check) == broken_rule]

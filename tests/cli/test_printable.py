@@ -32,6 +32,7 @@ def acts(text):
     return re.findall(kinds, text)
 
 
+@pytest.mark.slow
 @given(st.text())
 def test_nothing_that_acts_is_printed_and_the_rest_stays(text):
     assert acts(printable(text)) == []
@@ -69,6 +70,7 @@ def test_whatever_prints_a_text_prints_it_harmlessly(capsys, monkeypatch, stream
     assert "\\u001b" in out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("encoding", ["ascii", "latin-1", "utf-8"])
 def test_what_the_encoding_of_the_output_lacks_is_escaped(tmp_path, encoding):
     path = tmp_path / "größe カップ 🥤.csv"

@@ -240,6 +240,7 @@ def test_the_effort_of_a_dry_run_is_told_as_a_limit_where_velocities_are_command
     assert effort_words((), 0.0, 0.0) == ""
 
 
+@pytest.mark.slow
 def test_a_note_says_how_many_ticks_the_guard_limited_and_why_on_a_real_gripper(capsys):
     trial = load_pipeline(options=["gripper.object=block", "classifier.type=none"]).grasp()
     limited = "note        the guard limited the command in {} of 1000 ticks"

@@ -105,6 +105,7 @@ def test_columns_never_take_more_room_than_there_is(rows, room):
         assert all(width <= most for width, most in zip(widths, natural, strict=True))
 
 
+@pytest.mark.slow
 def test_json_is_the_same_in_a_terminal_and_in_a_pipe():
     shown = in_terminal(["plugins", "list", "--json"], 60)
 

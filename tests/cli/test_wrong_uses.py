@@ -48,6 +48,7 @@ def run(monkeypatch, tmp_path):
     return graspsense
 
 
+@pytest.mark.slow
 @every_case(
     ("typed", "meant"),
     [
@@ -267,6 +268,7 @@ def test_a_warning_of_a_library_is_a_note_in_one_line(run, monkeypatch):
     assert "advice" not in err
 
 
+@pytest.mark.slow
 def test_features_of_a_wrong_type_are_blamed_on_the_feature_set(monkeypatch):
     monkeypatch.setattr(CurveFeatures, "extract", lambda self, trace: {"peak": 1.0})
     grasp = load_pipeline(options=["features.type=curve", "classifier.type=none"]).grasp()

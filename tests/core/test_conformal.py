@@ -384,6 +384,7 @@ def test_the_commands_tell_the_sets_and_the_reliability(tmp_path, monkeypatch):
 
 
 # Right answers of probabilities that tell nothing, and of exact ones.
+@pytest.mark.slow
 @every_case("n", [20, 60, 200])
 @every_case("rate_of", [lambda probability: np.full_like(probability, 0.6), lambda probability: probability])
 def test_the_interval_of_a_certainty_holds_for_new_answers_and_its_highest_is_not_too_sure(rate_of, n):
@@ -489,6 +490,7 @@ def test_a_certainty_knows_the_drift_between_the_sessions_of_its_trials_and_no_o
     assert np.mean(differences) > 0.06 if too_sure else np.mean(differences) < 0.03
 
 
+@pytest.mark.slow
 def test_the_coverage_of_sets_is_that_of_all_sizes_together():
     covered: dict[int, list[bool]] = {}
     for seed in range(15):
@@ -574,6 +576,7 @@ def test_answers_for_one_object_count_for_more_than_one_where_the_objects_hardly
     assert said[1] < said[0] - 0.03
 
 
+@pytest.mark.slow
 def test_a_label_with_a_single_object_has_no_certainty_and_others_are_not_too_sure_beside_it():
     """Objects of a label differ: those of three labels are known by 10 others, of the fourth one only one is."""
     said, told = [], 0

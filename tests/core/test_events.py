@@ -42,6 +42,7 @@ def grasped(controller, gripper=Scripted):
     return run_grasp(gripper(squeezing, bottle), controller(HybridConfig()), RunConfig())
 
 
+@pytest.mark.slow
 def test_a_class_that_inherits_its_step_tells_its_events():
     class Renamed(HybridController):
         pass

@@ -3,6 +3,7 @@
 from math import inf, nan
 
 import numpy as np
+import pytest
 from attrs import evolve
 from cases import every_case
 from grippers import REST_S, Scripted, bottle, squeezing
@@ -205,6 +206,7 @@ def grasp_of(gripper):
     return run_grasp(gripper, HybridController(HybridConfig()), RunConfig())
 
 
+@pytest.mark.slow
 @every_case(
     ("fault", "names"),
     [
@@ -267,6 +269,7 @@ def test_open_fingers_are_as_wide_after_a_grasp_as_before_it(opens, end_m, is_to
     assert (watch.released(frame(5, end_m)) is not None) is is_told
 
 
+@pytest.mark.slow
 def test_a_fault_opens_the_fingers_with_no_more_effort_than_a_release():
     sound, failing = ByPosition(squeezing), ByPosition(squeezing, none_from_s=REST_S)
     assert grasp_of(sound).outcome is Outcome.STEADY
@@ -283,6 +286,7 @@ def test_fingers_that_still_close_when_they_are_told_to_open_are_not_open_where_
     assert grasp.trace.gap_m[-1] > 0.075
 
 
+@pytest.mark.slow
 @every_case(("stands_m", "outcome"), [(0.054, Outcome.STEADY), (nan, Outcome.ABORTED)])
 def test_fingers_whose_gap_is_no_witness_open_for_as_long_as_they_need_from_any_width(stands_m, outcome):
     """Their encoder has stood still, or failed, since they rest: 80 mm at 50 mm/s take 1.6 s."""

@@ -115,6 +115,7 @@ def test_neighbours_that_are_alike_are_held_out_in_blocks_of_the_order_of_record
     ]
 
 
+@pytest.mark.slow
 @every_case("stretches", [2, 4])
 def test_stretches_of_a_label_that_are_alike_as_after_a_new_mounting_are_held_out_whole(stretches):
     numbers = np.tile(np.repeat(np.arange(2), 8), stretches)
@@ -213,6 +214,7 @@ def test_named_instances_and_trials_sorted_by_a_feature_have_no_blocks():
     assert grouped(table, NO_COPIES) is table
 
 
+@pytest.mark.slow
 @every_case("each", [5, 20, 60])
 def test_grasps_that_do_not_resemble_their_neighbours_are_no_groups(each):
     for seed in range(40):
@@ -242,6 +244,7 @@ def test_what_is_said_of_new_objects_is_not_too_sure(make):
     assert np.mean(too_sure) < 0.03
 
 
+@pytest.mark.slow
 def test_a_certainty_says_for_which_objects_and_sessions_it_holds_unless_others_were_held_out(tmp_path):
     numbers, values = by_object(np.random.default_rng(1), objects=20)
     trials = table_of(numbers, values)
@@ -272,6 +275,7 @@ def test_a_rate_with_groups_held_out_is_not_said_to_be_that_of_new_objects():
     assert "other grasps" in verdict(evaluation)
 
 
+@pytest.mark.slow
 def test_instances_that_are_named_by_days_of_several_classes_are_held_out_as_days():
     rng = np.random.default_rng(2)
     numbers = np.tile(np.repeat(np.arange(3), 4), 5)

@@ -159,6 +159,7 @@ def test_the_trace_has_each_image_once_with_its_type_and_shape(seen):
     assert signals["eye"].until(signals["eye"].t_s[5]).cells.shape == (6, 6, 8, 3)
 
 
+@pytest.mark.slow
 @every_case(
     ("source", "write"),
     [("mcap", None), ("npz", write_npz), ("csv", write_csv), ("parquet", write_parquet)],
@@ -393,6 +394,7 @@ def test_pictures_for_foxglove_have_the_colours_of_the_camera(seen):
     assert b"rgb8" in messages[0]
 
 
+@pytest.mark.slow
 def test_a_camera_is_a_small_picture_in_the_report():
     import base64
     import zlib

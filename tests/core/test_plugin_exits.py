@@ -170,6 +170,7 @@ def test_no_number_of_a_controller_passes_the_limits(command):
     assert max(float.__float__(commanded.value) for commanded in squeezed) <= 100.0
 
 
+@pytest.mark.slow
 @every_case(
     "command", ["20", *(Command(EFFORT, value, math.inf, math.inf) for value in (None, [20.0], "20"))]
 )

@@ -182,6 +182,7 @@ def fail(*values, error=ZeroDivisionError):
     raise error
 
 
+@pytest.mark.slow
 @every_case(
     ("error", "reason"),
     [
@@ -227,6 +228,7 @@ def test_a_grasp_that_is_interrupted_while_the_fingers_open_keeps_its_outcome(ti
     assert let_go(gripper)
 
 
+@pytest.mark.slow
 def test_a_step_that_fails_or_returns_no_command_is_named_with_what_it_returns():
     def ends_in(command, state, phase, outcome):
         return command, state._replace(phase=phase, outcome=int(outcome))
@@ -287,6 +289,7 @@ class Recorded(Scripted):
         return super().read(timeout_s)
 
 
+@pytest.mark.slow
 @every_case(
     ("length", "outcome"),
     [

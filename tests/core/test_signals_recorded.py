@@ -225,6 +225,7 @@ def test_an_export_has_the_signals_as_arrays_and_as_csv_a_line_for_each_sample(r
     assert [float(row["cells_05"]) for row in images] == palm.cells[:, 5].tolist()
 
 
+@pytest.mark.slow
 @every_case("cells", [0, 40_000, None])  # more than a message once held
 def test_fingertips_of_any_size_or_without_images_are_recorded_and_read(tmp_path, cells):
     recorder = Recorder(tmp_path / "g.mcap")

@@ -441,6 +441,7 @@ def test_warnings_of_scikit_learn_are_one_line_each_with_a_count(recwarn):
     assert not [text for text in recwarn if "onverge" in str(text.message)]
 
 
+@pytest.mark.slow
 def test_shuffled_labels_are_recognised_as_often_as_by_guessing():
     """In folds of the real labels, a label that a fold has often is rare in its training trials: 42 % of noise."""
     noise = np.random.default_rng(2).normal(size=(2, 24))

@@ -157,6 +157,7 @@ def test_a_trial_unlike_all_training_trials_is_marked_and_one_that_lacks_a_featu
     assert lacking.no_interval
 
 
+@pytest.mark.slow
 def test_intervals_hold_for_new_objects_that_nobody_named_and_are_not_for_those_outside_the_trials():
     """Five grasps of each object in any order, each with its number measured again."""
     none = np.empty((2, 0), dtype=np.int64)

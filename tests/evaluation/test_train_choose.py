@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from commands import answered, printed, refused
 
+pytestmark = pytest.mark.slow
 MANIFEST = """\
 folder = "grasps"
 files = "{class}_{instance:d}_{order:d}.csv"
@@ -59,13 +60,8 @@ def runs(store, pipeline):
 @pytest.mark.parametrize(
     ("given", "least"),
     [
-        pytest.param(("-o", "features.type=curve"), 6, marks=pytest.mark.slow, id="every classifier"),
-        pytest.param(
-            ("--classifier", "extra-trees", "-o", "classifier.trees=10"),
-            4,
-            marks=pytest.mark.slow,
-            id="every feature set",
-        ),
+        pytest.param(("-o", "features.type=curve"), 6, id="every classifier"),
+        pytest.param(("--classifier", "extra-trees", "-o", "classifier.trees=10"), 4, id="every feature set"),
         pytest.param((), 24, marks=pytest.mark.long, id="all"),
     ],
 )
@@ -80,7 +76,6 @@ def test_among_all_candidates_one_that_knows_the_hold_is_chosen(store, tmp_path,
     runs(store, tmp_path / "own.toml")
 
 
-@pytest.mark.slow
 def test_the_text_names_the_pipeline_and_the_procedure(store, tmp_path):
     fixed = ("--classifier", "extra-trees", "-o", "classifier.trees=10", "-o", "features.type=union")
     out = printed("train", store, "--choose", *fixed, "--out", tmp_path / "own.json")
@@ -90,7 +85,6 @@ def test_the_text_names_the_pipeline_and_the_procedure(store, tmp_path):
     runs(store, tmp_path / "own.toml")
 
 
-@pytest.mark.slow
 def test_components_that_are_given_stay_run_on_a_recording_and_are_not_replaced(store, tmp_path):
     given = ("-o", "features.type=curve", "--classifier", "knn")
     (candidate,) = choice_of(store, tmp_path, *given)["ranking"]["candidates"]
@@ -118,7 +112,6 @@ def test_a_table_has_its_features_and_gets_no_pipeline(tmp_path):
     assert not (tmp_path / "own.toml").exists()
 
 
-@pytest.mark.slow
 def test_trials_from_which_nothing_can_be_chosen(store, tmp_path):
     out = ("--out", tmp_path / "own.json")
     assert "'foam'" in refused("train", store, "--choose", "--only", "foam", *out)
@@ -134,7 +127,6 @@ def test_options_that_do_not_go_with_it(store, tmp_path, option):
     assert not (tmp_path / "own.json").exists()
 
 
-@pytest.mark.slow
 def test_recordings_without_contact_are_told_apart_by_the_features_that_need_none(store, tmp_path):
     given = ("-o", "features.contact_force_n=15", "--classifier", "extra-trees", "-o", "classifier.trees=10")
     choice = choice_of(store, tmp_path, *given)
@@ -145,7 +137,6 @@ def test_recordings_without_contact_are_told_apart_by_the_features_that_need_non
     assert any("curve" in note and "0 of 16" in note for note in choice["ranking"]["notes"])
 
 
-@pytest.mark.slow
 def test_sets_of_many_features_are_left_to_classifiers_that_take_them_quickly(store, tmp_path):
     ranking = choice_of(store, tmp_path, "--classifier", "knn")["ranking"]
 

@@ -61,6 +61,7 @@ def table(path, seed, separation):
     path.write_text("what,w [m]\n" + "\n".join(lines) + "\n")
 
 
+@pytest.mark.slow
 def test_a_replaced_table_is_evaluated_anew_and_it_is_said(tmp_path):
     table(tmp_path / "t.csv", 1, 50.0)
     file, results = experiment(tmp_path, "t.csv"), Results(tmp_path / "out")
@@ -141,6 +142,7 @@ def test_results_of_other_versions_are_told_and_those_of_an_older_form_computed_
     assert rate_of(planned, results) == (1.0, 40)
 
 
+@pytest.mark.slow
 def test_a_comparison_names_the_inputs_whose_content_differs(tmp_path):
     file = experiment(tmp_path, "t.csv")
     for seed, name in enumerate(("a", "b", "c")):
@@ -447,6 +449,7 @@ def test_what_is_no_file_is_no_input():
     }
 
 
+@pytest.mark.slow
 @every_case(
     ("sweep", "key"),
     [
@@ -491,6 +494,7 @@ def test_a_sweep_that_a_table_depends_on_is_planned(tmp_path, sweep, tasks):
     assert len({task.key for task in planned.tasks()}) == tasks
 
 
+@pytest.mark.slow
 @every_case(
     ("sweep", "alike"),
     [('"judge.grasps" = [0, 3]', [["grasps 0", "grasps 3"]]), ('"judge.folds" = [2, 3]', [])],

@@ -1,12 +1,11 @@
 """What a simulator's accuracy costs: the table, and what the command refuses."""
 
-import json
 import math
 
 import pytest
 from attrs import evolve
+from commands import answered, refused
 
-from graspsense.cli.main import main
 from graspsense.evaluation.intervals import Difference
 from graspsense.experiments.simulation import PEAK, TRACE, SimulationTrade, VariantPoint, simulation_table
 from graspsense.experiments.simulation_recognition import conclusion
@@ -56,25 +55,17 @@ def test_a_row_says_time_set_up_errors_and_what_failed():
     assert by_step["broken", "1 ms"][3:7] == ("-", "12.5", "-", "-")
 
 
-def ended(arguments):
-    with pytest.raises(SystemExit) as end:
-        main(arguments)
-    return end.value.code
-
-
-def test_a_gripper_with_nothing_to_trade_is_refused(capsys, tmp_path):
+def test_a_gripper_with_nothing_to_trade_is_refused(tmp_path):
     file = tmp_path / "squeeze.csv"
     file.write_text("t,gap\n0,0\n")
     options = ["--gripper", "replay", "-o", f"gripper.recording=csv:{file}"]
-    assert ended(["tradeoff", "simulation", *options]) == 2
-    assert "no accuracy" in capsys.readouterr().err
+    assert "no accuracy" in refused("tradeoff", "simulation", *options)
 
 
 @pytest.mark.slow
-def test_the_simulator_gets_better_with_finer_steps(capsys):
-    arguments = ["--scene", "can:empty_open", "--seeds", "1", "--instances", "2", "--json"]
-    assert ended(["tradeoff", "simulation", *arguments]) == 0
-    answer = json.loads(capsys.readouterr().out)
+def test_the_simulator_gets_better_with_finer_steps():
+    few = ("--scene", "can:empty_open", "--seeds", "1", "--instances", "2")
+    answer = answered("tradeoff", "simulation", *few)
     points = answer["points"]
     assert [p["role"] for p in points].count("reference") == 1
     assert {p["failure"] for p in points} == {""}
@@ -113,8 +104,7 @@ def test_the_conclusion_says_whether_a_lower_accuracy_saves_time_or_costs_recogn
 
 
 @pytest.mark.slow
-def test_without_a_classifier_errors_and_times_are_measured(capsys):
-    arguments = ["--scene", "block", "--seeds", "1", "-o", "classifier.type=none", "--json"]
-    assert ended(["tradeoff", "simulation", *arguments]) == 0
-    points = json.loads(capsys.readouterr().out)["points"]
+def test_without_a_classifier_errors_and_times_are_measured():
+    few = ("--scene", "block", "--seeds", "1", "-o", "classifier.type=none")
+    points = answered("tradeoff", "simulation", *few)["points"]
     assert all(p["errors"] and p["recognised"] is None for p in points)

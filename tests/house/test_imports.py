@@ -145,6 +145,7 @@ def test_a_room_knows_those_before_it_only(package, rooms):
             assert {".".join(imported.split(".")[:3]) for imported in within} <= allowed, name
 
 
+@pytest.mark.slow
 @every_case("package", [SOURCE, *map(package_of, distributions())])
 def test_no_module_imports_itself_through_others(package):
     known = modules(package)
@@ -239,6 +240,7 @@ for command in {}:
 ALL_DOORS = f"import graspsense, {', '.join(f'graspsense.{door}' for door in DOORS)}"
 
 
+@pytest.mark.slow
 @every_case(
     ("code", "left_out"),
     [

@@ -5,7 +5,7 @@ from grippers import bottle, squeezing
 
 from graspsense.core.components.registry import installed
 from graspsense.sources.recordings.grasp_csv import named
-from graspsense.testing import examine, parametrize_checks
+from graspsense.testing import examine
 
 
 def recording(folder):
@@ -78,8 +78,3 @@ def test_a_distribution_of_ours_conforms(name):
 
 def test_the_recorded_gripper_conforms(tmp_path):
     assert examine("replay", keys={"recording": recording(tmp_path)}).report().failures == []
-
-
-@parametrize_checks("graspsense/chitta")
-def test_the_kit_as_cases(check):
-    check.run()

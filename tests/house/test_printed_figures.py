@@ -20,6 +20,7 @@ from graspsense.core.settings.selected import select_component
 from graspsense.evaluation.checkpoints import SURE, early_recognition
 from graspsense.sources.trial_source import load_trials
 
+pytestmark = pytest.mark.slow
 RESULTS = ROOT / "benchmarks" / "results"
 PERCENTAGE = re.compile(r"\b\d+\.\d %")
 SAME_ON_ANY_PROCESSOR = 0.006
@@ -88,7 +89,6 @@ def test_what_a_shake_tells_is_what_its_results_say():
         assert f"{rate} % ({low} to {high})" in page("hold")
 
 
-@pytest.mark.slow
 def test_the_picture_of_the_readme_shows_the_grasp_of_today(tmp_path):
     printed("run", "--plot", tmp_path / "grasp.png")
     with Image.open(tmp_path / "grasp.png") as today, Image.open(ROOT / "docs" / "grasp.png") as shown:
@@ -125,7 +125,6 @@ def assert_same_rates(text, today, *begin, most=None):
     assert measured == pytest.approx(told, abs=SAME_ON_ANY_PROCESSOR), begin
 
 
-@pytest.mark.slow
 @every_case(
     ("options", "classifiers", "features"),
     [
@@ -143,10 +142,9 @@ def test_a_comparison_of_classifiers_is_the_one_of_today(options, classifiers, f
             assert_same_rates(stored, today, classifier, name, most=2)
 
 
-@pytest.mark.slow
 @every_case("part", ["speed", "squeezes", "physics", "accuracy"])
 def test_a_trade_off_is_the_one_of_today(tmp_path, part):
-    printed("tradeoff", part, "-o", "seeds=4", "--out", tmp_path)
+    printed("tradeoff", part, "-o", "seeds=4", "--executor", "serial", "--out", tmp_path)
     today = (tmp_path / "report.md").read_text()
     cases = [line.strip("| ").split(" | ")[:2] for line in today.splitlines() if PERCENTAGE.search(line)]
     tabled = [case for case in cases if len(case) == 2]
@@ -155,7 +153,6 @@ def test_a_trade_off_is_the_one_of_today(tmp_path, part):
         assert_same_rates(results("trade"), today, *case)
 
 
-@pytest.mark.slow
 def test_certainties_are_those_of_today():
     text, benchmark = results("evaluation"), ROOT / "benchmarks" / "certainty.py"
     asked = re.search(r"certainty\.py (--seed \d+ --instances \d+)", text)[1].split()
@@ -170,7 +167,6 @@ def test_certainties_are_those_of_today():
         assert shown == pytest.approx(rates(cells)[:2], abs=0.02)
 
 
-@pytest.mark.slow
 def test_sets_and_reliability_are_those_of_today():
     asked = "--instances 60 --trials 1 --classifier c45 --json"
     today = json.loads(printed("evaluate", "simulated", *asked.split()))
@@ -184,7 +180,6 @@ def test_sets_and_reliability_are_those_of_today():
     assert f"| {reliability['brier']:.3f} |" in told
 
 
-@pytest.mark.slow
 def test_what_is_told_of_a_kind_that_was_not_trained_is_that_of_today(tmp_path):
     model, few = tmp_path / "three.json", ("--instances", "40", "--trials", "1")
     learned = ("--objects", "naked,can,water", "--classifier", "knn", "--out", model)
@@ -197,7 +192,6 @@ def test_what_is_told_of_a_kind_that_was_not_trained_is_that_of_today(tmp_path):
     assert shares == pytest.approx([unknown, of_knn], abs=SAME_ON_ANY_PROCESSOR)
 
 
-@pytest.mark.slow
 @pytest.mark.skipif(
     "GRASPSENSE_ICUB" not in os.environ, reason="GRASPSENSE_ICUB names no folder of recordings"
 )
@@ -211,21 +205,20 @@ def test_the_rates_of_the_icub_data_set_are_those_of_today():
     assert [f"{share:.3f}" for share in shares] == [told[0], *told[3:6]]
 
 
-@pytest.mark.slow
 def test_what_a_gripper_tells_apart_is_the_figure_of_today(tmp_path):
     shipped = (ROOT / "src/graspsense/experiments/shipped/which_gripper.toml").read_text()
     head, *variants = re.split(r"^(?=\[\[variants\]\]|\[data\])", shipped, flags=re.MULTILINE)
     alone = [part for part in variants if 'name = "Robotiq 2F-85"\n' in part or part.startswith("[data]")]
     assert len(alone) == 2
     (tmp_path / "alone.toml").write_text("".join([head, *alone]))
-    today = printed("experiment", tmp_path / "alone.toml", "--out", tmp_path / "results")
+    asked = ("--executor", "serial", "--out", tmp_path / "results")
+    today = printed("experiment", tmp_path / "alone.toml", *asked)
     told = rates(row(page("which_gripper"), "Robotiq 2F-85"))
     # Another rounding may turn a grasp of 71 into a copy of another, or change its answer.
     for target, share in (("both", told[0]), ("class", told[2])):
         assert rates(row(today, "Robotiq 2F-85", target))[0] == pytest.approx(share, abs=0.03)
 
 
-@pytest.mark.slow
 def test_recognition_before_the_end_is_the_one_of_today():
     text = page("early_recognition")
     times = (0.05, 0.1, 0.15, 0.2, 0.3)
@@ -242,7 +235,6 @@ def test_recognition_before_the_end_is_the_one_of_today():
         assert [told[0], *told[-2:]] == pytest.approx(shares, abs=SAME_ON_ANY_PROCESSOR), name
 
 
-@pytest.mark.slow
 @every_case("pipeline", ["default", "best"])
 def test_the_rate_of_a_shipped_model_is_the_one_of_today(pipeline):
     told = dict(
@@ -255,7 +247,6 @@ def test_the_rate_of_a_shipped_model_is_the_one_of_today(pipeline):
     assert sum(right) / 1005 == pytest.approx(float(told[pipeline]) / 100.0, abs=SAME_ON_ANY_PROCESSOR)
 
 
-@pytest.mark.slow
 def test_the_printed_prediction_is_the_one_of_today():
     block = re.search(r"^    \$ graspsense (run .*)\n((?:    \S.*\n)+)", page("evaluation"), re.MULTILINE)
     today = printed(*block[1].split())
@@ -263,7 +254,6 @@ def test_the_printed_prediction_is_the_one_of_today():
         assert line.strip() in today
 
 
-@pytest.mark.slow
 def test_the_printed_evaluation_is_the_one_of_today():
     text = page("evaluation")
     command = re.search(r"`graspsense (evaluate simulated .*--json)`", text)[1]
@@ -275,7 +265,6 @@ def test_the_printed_evaluation_is_the_one_of_today():
     assert f'"difference": {{"value": {evaluation["controls"]["width_only"]["difference"]["value"]},' in text
 
 
-@pytest.mark.slow
 def test_the_printed_identification_is_the_one_of_today(tmp_path, monkeypatch):
     text = page("identify")
     monkeypatch.chdir(tmp_path)

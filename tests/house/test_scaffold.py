@@ -109,6 +109,7 @@ def test_the_first_commands_find_the_scene_from_where_they_are_printed_and_from_
     assert "graspsense run --object scene.toml -o" in (tmp_path / "lab-term" / "README.md").read_text()
 
 
+@pytest.mark.slow
 def test_nothing_is_written_over(tmp_path):
     make("lab-thing", ["observer"], tmp_path / "lab-thing")
 

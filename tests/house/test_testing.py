@@ -31,6 +31,8 @@ def short_openings(monkeypatch):
 SLOW_CHECKS = {
     "ends-every-grasp",
     "read-returns-within-its-timeout",
+    "same-features-elsewhere",
+    "same-model-elsewhere",
     "what-it-delivers-is-kept",
     "squeezes-with-what-it-is-asked",
     "says-what-it-asks-for",
@@ -152,6 +154,7 @@ def test_an_expected_failure_is_no_failure_and_an_unexpected_pass_is_one():
     assert "expected failures" in passing.text
 
 
+@pytest.mark.slow
 def test_one_part_is_found_by_name_and_a_wrong_name_by_likeness():
     class Plugin:
         GRASPSENSE_API = (2, 0)

@@ -75,6 +75,7 @@ def test_a_sensor_that_fails_is_named_and_a_sound_gripper_not_accused(pipelines,
         assert names or (grasp.outcome, features.reasons) == (Outcome.STEADY, {})
 
 
+@pytest.mark.slow
 @every_case("pipeline", SERVOS)
 def test_half_the_scale_of_the_effort_gives_no_wrong_contact(pipeline):
     _, features = grasped(pipeline, lambda frame, start: {"effort_n": 0.5 * frame.effort_n})

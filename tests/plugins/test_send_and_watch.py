@@ -102,6 +102,7 @@ def held_n(trace):
     return trace.force_left_n[trace.phase == Phase.HOLD][-1]
 
 
+@pytest.mark.slow
 @every_case("keys", [{}, {"loop": "closed"}])
 @every_case("thing", ["a soft object", "a hard object"])
 def test_hybrid_approaches_gently_and_raises_the_force_in_steps(thing, keys):
@@ -117,6 +118,7 @@ def test_hybrid_approaches_gently_and_raises_the_force_in_steps(thing, keys):
     assert trace.force_left_n[after_contact(trace)].max() < 8.0
 
 
+@pytest.mark.slow
 @every_case(("sends", "command"), [("position", (POSITION, 0.0)), ("force", (FORCE, 20.0))])
 def test_force_sends_its_force_with_the_closed_position(sends, command):
     body = Body(WITH_PADS, "a hard object", width_m=0.05)
@@ -219,6 +221,7 @@ def test_what_every_law_becomes_is_told(pipeline, monkeypatch, law, kinds):
         assert any(f" {sends} becomes {Hand.closes_itself[sends]}" in note for note in notes)
 
 
+@pytest.mark.slow
 @every_case("law", ["hybrid", "send-and-watch"])
 def test_steps_shorter_than_the_delay_of_a_command_are_refused(pipeline, law, monkeypatch):
     monkeypatch.setattr(Hand, "command_delay_s", 0.15)

@@ -60,6 +60,7 @@ def test_every_tactile_image_is_followed_by_its_pictures(recording):
     assert brightest == 255
 
 
+@pytest.mark.slow
 def test_the_brightest_cell_is_the_one_that_is_pressed_hardest(recording):
     trial, _, pictures = recording
     left = [value for topic, _, _, value in decoded(pictures) if topic.endswith("pads_left")]

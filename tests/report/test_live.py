@@ -12,12 +12,10 @@ from urllib.request import Request, urlopen
 
 import click
 import pytest
-from click.testing import CliRunner
-from commands import graspsense
+from commands import graspsense, printed
 from live_grasp import COMMAND, device, port_of, reading, shown
 
 from graspsense.cli.live import _host_and_port
-from graspsense.cli.main import cli
 from graspsense.core.pipeline.pipeline import load_pipeline
 from graspsense.core.values.errors import ConfigError, PluginUnavailable
 from graspsense.core.values.signals import SQUEEZE
@@ -241,9 +239,9 @@ def test_a_page_that_is_killed_loses_no_grasp(feed):
 @every_case(("option", "module"), [("live", "websockets"), ("foxglove", "foxglove"), ("rerun", "rerun")])
 def test_a_package_that_is_missing_is_named_before_the_grasp(monkeypatch, option, module):
     monkeypatch.setitem(sys.modules, module, None)
-    done = CliRunner().invoke(cli, ["run", f"--{option}"])
-    assert isinstance(done.exception, PluginUnavailable)
-    assert f"graspsense[{option}]" in str(done.exception)
+    done = graspsense("run", f"--{option}")
+    assert done.returncode == PluginUnavailable.exit_code
+    assert f"graspsense[{option}]" in done.stderr
 
 
 @pytest.mark.slow
@@ -254,9 +252,7 @@ def test_a_trial_is_stored_as_without_a_page(tmp_path):
     shown_by = ["--live", "--foxglove", "--rerun", str(tmp_path / "grasp.rrd")]
     for name, live in (("with", shown_by), ("without", [])):
         asked = ["run", "--save", str(tmp_path / name), "--seed", "3", "--json", *live]
-        done = graspsense(*asked)
-        assert done.returncode == 0, done.stderr
-        said.append(json.loads(done.stdout))
+        said.append(json.loads(printed(*asked)))
     for line in said:
         del line["seconds_wall"], line["kept"]["store"]
     assert said[0] == said[1]

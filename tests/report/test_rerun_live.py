@@ -24,6 +24,7 @@ from graspsense.recording.layout import TICK_FIELDS
 if find_spec("rerun") is None:
     pytest.skip("needs the extra rerun", allow_module_level=True)
 
+pytestmark = pytest.mark.slow
 PATIENCE_S = 60.0
 RERUN = "graspsense.live.rerun_process"
 
@@ -60,7 +61,6 @@ def check_complete(columns, n=20):
     assert columns["/grasp/events"][1][-1] == "outcome: steady"
 
 
-@pytest.mark.slow
 def test_the_reader_of_rerun_finds_what_was_logged(tmp_path):
     path = tmp_path / "grasp.rrd"
     feed = LiveFeed(RERUN, [str(path)])
@@ -69,7 +69,6 @@ def test_the_reader_of_rerun_finds_what_was_logged(tmp_path):
     check_complete(logged(path))
 
 
-@pytest.mark.slow
 def test_the_reader_of_rerun_finds_the_whole_grasp(tmp_path):
     path = tmp_path / "grasp.rrd"
     feed = LiveFeed(RERUN, [str(path)])
@@ -115,7 +114,6 @@ def viewer(tmp_path):
             os.killpg(running.pid, signal.SIGKILL)
 
 
-@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:RRD file has no footer")
 def test_a_viewer_that_runs_receives_the_grasp(viewer, tmp_path):
     running, address = viewer
@@ -127,7 +125,6 @@ def test_a_viewer_that_runs_receives_the_grasp(viewer, tmp_path):
     check_complete(logged(tmp_path / "received.rrd"))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP], ids=["killed", "stopped"])
 def test_a_viewer_that_goes_away_loses_no_grasp(viewer, how):
     running, address = viewer
@@ -138,7 +135,6 @@ def test_a_viewer_that_goes_away_loses_no_grasp(viewer, how):
     assert address in feed.close()
 
 
-@pytest.mark.slow
 def test_without_a_viewer_the_command_says_so_before_the_grasp(tmp_path):
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))

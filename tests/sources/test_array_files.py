@@ -43,6 +43,7 @@ COLUMNS = 'time = "c1"\ngap = "c2"\nforce = "c3"\n'
 SAVE = {"npz": lambda path, arrays: np.savez(path, **arrays), "mat": scipy.io.savemat}
 
 
+@pytest.mark.slow
 @every_case("ending", ["npy", "npz", "mat", "h5"])
 def test_an_array_of_three_dimensions_is_read_alike_in_every_file_and_asked_about(ending, tmp_path):
     path = tmp_path / f"jar.{ending}"
@@ -134,6 +135,7 @@ def test_nothing_outside_of_an_hdf5_file_is_read(tmp_path):
     assert list(hdf5_arrays(path)) == ["gap"]
 
 
+@pytest.mark.slow
 def test_a_damaged_or_large_hdf5_file_is_told_by_its_name(tmp_path, monkeypatch):
     path = tmp_path / "jar.h5"
     with h5py.File(path, "w") as file:
@@ -210,6 +212,7 @@ def test_groups_of_hdf5_are_grasps_and_the_attribute_units_is_the_unit_of_an_arr
 UNSIGNED = np.array([0, 40000, 60000, 60001, 65535], dtype="u2").view("i2")
 
 
+@pytest.mark.slow
 @every_case(
     ("stored", "attributes", "expected"),
     [

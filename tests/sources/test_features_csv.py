@@ -317,6 +317,7 @@ def test_a_heading_in_decomposed_letters_is_that_in_composed_ones(csv):
     assert read_labelled(csv(GOOD.replace("what", "Beha\u0308lter")), "Beh\u00e4lter").classes == ("a", "b")
 
 
+@pytest.mark.slow
 @every_case(
     "other",
     [

@@ -317,6 +317,7 @@ def test_a_key_of_a_manifest_out_of_bounds_is_answered(tmp_path, key):
 TOO_MANY_ROWS = "t,g,F\n" + "".join(f"{k},60,1\n" for k in range(limits.RECORDINGS.default + 1))
 
 
+@pytest.mark.slow
 @every_case(
     ("text", "csv", "says"),
     [

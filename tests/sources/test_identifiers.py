@@ -200,6 +200,7 @@ NAMED = {
 }
 
 
+@pytest.mark.slow
 @every_case("heading", NAMED)
 def test_what_tells_of_the_recording_is_a_feature_only_where_it_is_asked_for(heading, tmp_path):
     path = table(tmp_path / "t.csv", heading, NAMED[heading])
@@ -280,6 +281,7 @@ DOUBTFUL = {
 }
 
 
+@pytest.mark.slow
 @every_case("doubt", DOUBTFUL)
 def test_a_column_that_may_reveal_the_labels_or_drifts_is_told(doubt, tmp_path):
     notes = notes_on(tmp_path / "t.csv", *DOUBTFUL[doubt])
@@ -296,6 +298,7 @@ def test_what_drifts_is_told_in_the_order_of_recording(tmp_path):
     assert any("kind" in note and "order of recording" in note for note in notes)
 
 
+@pytest.mark.slow
 @every_case(
     ("heading", "values"),
     [

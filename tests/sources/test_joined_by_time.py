@@ -50,6 +50,7 @@ def nanoseconds(t_s):
     return [f"{1_700_000_000 * 10**9 + round(1e9 * time)}" for time in t_s.tolist()]
 
 
+@pytest.mark.slow
 @every_case("write", [seconds, stamps, milliseconds, nanoseconds])
 @every_case("times", [np.arange(0.0, 3.0, 0.004), np.arange(0.5, 2.9, 0.03), np.arange(-1.0, 4.0, 0.01)])
 def test_a_file_beside_with_a_rate_of_its_own_is_joined_by_time(tmp_path, write, times):

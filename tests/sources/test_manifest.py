@@ -208,6 +208,7 @@ def squeezes_of(folder, force, gap, time):
 FOUR = (1.0, 1.0, 1.0, 1.0)
 
 
+@pytest.mark.slow
 @every_case(
     ("factors", "change"),
     [
@@ -249,6 +250,7 @@ def bumped(newtons, force):
     return without(force, begin, begin + 15, newtons)
 
 
+@pytest.mark.slow
 @every_case(
     ("factors", "change", "number", "told"),
     [
@@ -327,6 +329,7 @@ def test_one_of_several_squeezes_that_is_unlike_the_others_is_told(pads, gap_m, 
     assert bool(of_object[2].notices) == (told is not None and "share" in told)
 
 
+@pytest.mark.slow
 def test_a_grasp_is_replayed_and_evaluated_with_the_thresholds_of_its_import(tmp_path):
     """The force has noise of 0.3 N about 0.4 N without contact, in which the default finds a contact at once."""
     rng, (gap, force) = np.random.default_rng(5), squeezing(offset_n=0.4)
@@ -397,6 +400,7 @@ def test_files_with_a_text_where_a_pattern_wants_digits_are_told(tmp_path):
     assert "notes" not in told[0]
 
 
+@pytest.mark.slow
 @every_case(
     ("spoilt", "value"), [("force", 1e6), ("force", np.nan), ("force", np.inf), ("gap", 900.0), ("time", 0.0)]
 )
@@ -474,6 +478,7 @@ GAP_M, FORCE_N = squeezing()
 KEPT = {"time": T_S, "gap": GAP_M, "force": FORCE_N}
 
 
+@pytest.mark.slow
 @every_case(
     ("columns", "says"),
     [
@@ -603,6 +608,7 @@ def test_a_mistake_in_a_manifest_is_told_with_what_is_allowed(text, says, tmp_pa
 # The commands.
 
 
+@pytest.mark.slow
 def test_a_bad_file_does_not_stop_an_import_and_a_second_run_takes_only_what_is_missing(tmp_path):
     for k in range(4):
         gap, force = squeezing(stiffness_n_m=1000.0 + 100.0 * k)
@@ -651,6 +657,7 @@ def force_only(folder, count=4):
     return manifest(folder, 'files = "{label}_{order:d}.csv"\ntime = "t"\nleft = "a"\nright = "b"')
 
 
+@pytest.mark.slow
 def test_a_recording_without_a_gap_is_a_trial_of_its_force(tmp_path):
     place = force_only(tmp_path)
     code, out, err = graspsense("import", place, "--save", tmp_path / "trials")

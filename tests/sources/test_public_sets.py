@@ -386,6 +386,7 @@ def test_shocks_of_a_fingertip_with_lists_in_its_cells(tmp_path):
 # The commands.
 
 
+@pytest.mark.slow
 def test_a_whole_set_is_imported_evaluated_and_replayed(tmp_path):
     jaco(tmp_path)
     described, store = tmp_path / "m.toml", tmp_path / "store"

@@ -1,13 +1,11 @@
 """What features need is compared with what each recording has, by every command that reads recordings."""
 
-import ast
 import re
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from commands import graspsense, printed, refused
 
-from graspsense.cli.main import cli
 from graspsense.core.values.errors import WiringError
 from graspsense.plugin_api import create
 from graspsense.store.store import Store
@@ -37,20 +35,13 @@ def manifest(folder, name, palm=True):
     return str(folder / name / "set.toml")
 
 
-def ran(*args):
-    done = CliRunner().invoke(cli, [str(argument) for argument in args])
-    error = done.exception
-    assert error is None or isinstance(error, SystemExit | Exception)
-    return done, str(error) if error is not None and not isinstance(error, SystemExit) else ""
-
-
 def options(*given):
     return [word for option in given for word in ("-o", option)]
 
 
 def proposed(words):
     """The options in a message."""
-    return options(*ast.literal_eval(re.search(r"palm: options=(\[.*?\])", words)[1]))
+    return re.search(r"palm: ((-o \S+\s*)+)", words)[1].split()
 
 
 @pytest.mark.parametrize(
@@ -65,44 +56,42 @@ def test_an_array_that_the_features_do_not_name_is_told_with_the_options_that_ch
     }[command]
     which = [] if command == "compare" else options("features.type=contact-image")
     sets = ["--feature-sets", "contact-image"] if command == "compare" else []
-    refused, words = ran(*arguments, *which, *sets)
+    failed = graspsense(*arguments, *which, *sets)
 
-    assert refused.exit_code
-    assert "'pads'" in words
-    assert "palm" in words
-    done, words = ran(*arguments, *which, *sets, *proposed(words))
-    assert done.exit_code == 0, done.output + words
+    assert failed.returncode
+    assert "'pads'" in failed.stderr
+    assert "palm" in failed.stderr
+    printed(*arguments, *which, *sets, *proposed(failed.stderr))
 
 
+@pytest.mark.slow
 def test_recordings_that_have_the_array_are_imported_and_the_others_told(tmp_path):
     whole, without = manifest(tmp_path, "whole"), manifest(tmp_path, "without", palm=False)
-    done, words = ran(
-        "import", whole, without, "--save", tmp_path / "s", *options("features.type=contact-image", *CHOSEN)
-    )
+    given = options("features.type=contact-image", *CHOSEN)
+    done = graspsense("import", whole, without, "--save", tmp_path / "s", *given)
 
-    assert done.exit_code == 5, done.output + words
+    assert done.returncode == 5, done
     with Store.read(tmp_path / "s") as store:
         assert len(store.page(limit=100)) == 6
-    assert done.output.count("'palm'") == 6
+    assert (done.stdout + done.stderr).count("'palm'") == 6
 
 
 @pytest.mark.slow
 def test_trials_of_a_store_that_lack_the_array_are_left_out_and_told(tmp_path):
     for name, palm in (("without", False), ("whole", True)):
-        done, words = ran("import", manifest(tmp_path, name, palm=palm), "--save", tmp_path / "s")
-        assert done.exit_code == 0, done.output + words
+        printed("import", manifest(tmp_path, name, palm=palm), "--save", tmp_path / "s")
     given = options("features.type=contact-image", *CHOSEN)
     for command, *more in (
         ("features", "--json"),
         ("evaluate", "--folds", 3, "--json"),
         ("train", "--out", tmp_path / "m.json"),
     ):
-        done, words = ran(command, tmp_path / "s", *more, *given)
+        done = graspsense(command, tmp_path / "s", *more, *given)
 
-        assert done.exit_code == 0, done.output + words
+        assert done.returncode == 0, done
         if command != "train":
-            assert "6 of 12 recordings" in done.output
-            assert "palm" in done.output
+            assert "6 of 12 recordings" in done.stdout + done.stderr
+            assert "palm" in done.stdout + done.stderr
 
 
 def test_a_replay_says_which_channels_the_recording_has(tmp_path):
@@ -111,19 +100,16 @@ def test_a_replay_says_which_channels_the_recording_has(tmp_path):
 
     names = [channel.name for channel in backend.channels]
     assert names == ["gap", "velocity", "force_left", "force_right", "palm"]
-    refused, words = ran("replay", f"manifest:{source}#1", *options("features.type=chitta-without-pads"))
-    assert refused.exit_code == WiringError.exit_code or "effort" in words
-    assert "'effort'" in words
+    replayed = graspsense("replay", f"manifest:{source}#1", *options("features.type=chitta-without-pads"))
+    assert replayed.returncode == WiringError.exit_code
+    assert "'effort'" in replayed.stderr
 
 
 def test_other_features_than_those_of_the_model_are_imported_without_a_prediction(tmp_path):
     source = manifest(tmp_path, "set")
-    done, words = ran("import", source, "--save", tmp_path / "s", *options("features.type=curve"))
+    done = graspsense("import", source, "--save", tmp_path / "s", *options("features.type=curve"))
 
-    assert done.exit_code == 0, done.output + words
-    assert "no predictions" in done.output
-    own, words = ran(
-        "import", source, "--save", tmp_path / "t", *options("features.type=curve", "classifier.type=c45")
-    )
-    assert own.exit_code
-    assert "classifier" in words + own.output
+    assert done.returncode == 0, done
+    assert "no predictions" in done.stdout + done.stderr
+    with_own = options("features.type=curve", "classifier.type=c45")
+    assert "classifier" in refused("import", source, "--save", tmp_path / "t", *with_own)

@@ -4,6 +4,7 @@ from math import inf, nan
 from typing import Any
 
 import numpy as np
+import pytest
 from cases import every_case
 from hypothesis import given
 from hypothesis import strategies as st
@@ -266,6 +267,7 @@ def test_a_glitch_under_a_load_is_noticed_at_any_rate(rate_hz: float, samples: i
     assert "60 N at 1.1 s" in notice
 
 
+@pytest.mark.slow
 @every_case("noise", [0.0, 0.06, 0.1])
 @every_case("side", ["left", "right"])
 @every_case(("from_s", "until_s"), [(0.0, 9.0), (0.5, 9.0), (1.5, 9.0), (2.0, 9.0), (1.6, 1.65), (2.0, 2.2)])
@@ -299,6 +301,7 @@ SHARES = {
 }
 
 
+@pytest.mark.slow
 @every_case("share", SHARES)
 @every_case("units", [{}, {"force_left": "counts", "force_right": "counts"}])
 def test_opposed_pads_that_bear_different_forces_are_noticed(share: str, units: dict[str, str]) -> None:

@@ -143,6 +143,7 @@ def _cut(path):
     path.write_bytes(workbook(path, ("s", TRIALS, "visible")).read_bytes()[:3000])
 
 
+@pytest.mark.slow
 @every_case(
     "write", [_many_texts, _distant_cells, _cut, lambda path: path.write_bytes(b"PK\x03\x04 no archive")]
 )

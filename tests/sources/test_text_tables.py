@@ -128,6 +128,7 @@ VARIANTS = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @every_case("lines", VARIANTS.values())
 def test_a_recording_is_read_as_instruments_write_it(lines, tmp_path):
     path = tmp_path / "jar.csv"

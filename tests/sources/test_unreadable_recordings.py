@@ -104,6 +104,7 @@ SPOIL = {
 }
 
 
+@pytest.mark.slow
 @every_case("kind", SPOIL)
 def test_of_a_manifest(tmp_path, kind):
     folder = filled(tmp_path)

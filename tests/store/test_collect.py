@@ -131,6 +131,7 @@ def test_other_settings_are_taken_if_it_is_told(grasped):
     printed(*command, "-o", "classifier.type=knn", answers="q\n")
 
 
+@pytest.mark.slow
 def test_another_gripper_is_refused_before_it_moves(tmp_path):
     class Serial(Scripted):
         commanded = 0

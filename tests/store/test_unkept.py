@@ -116,6 +116,7 @@ def numbers_in(folder):
         return [summary.id for summary in store.page(set_aside=None)]
 
 
+@pytest.mark.slow
 def test_a_grasp_whose_recorder_fails_is_not_kept_and_its_outcome_says_why(plugins, tmp_path):
     settings = resolve("default", options=["gripper.type=uncountable", *PLAIN], plugins=plugins)
     with Store.open(tmp_path / "t") as store:

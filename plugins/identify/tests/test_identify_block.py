@@ -13,6 +13,8 @@ from graspsense_identify.run import _settings, identify
 from graspsense_identify.share import measured_shares
 from graspsense_sim_gripper.config import SimConfig
 
+pytestmark = pytest.mark.slow
+
 
 def squeezes(scene, gripper, count=3):
     """Return recordings that say nothing of the fingertips they were made with."""
@@ -23,7 +25,7 @@ def ready(block):
     return [prepared(squeeze, 0.0) for squeeze in block]
 
 
-@pytest.mark.parametrize("hardening", [None, pytest.param(1e-3, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("hardening", [None, 1e-3])
 def test_the_fingertips_of_known_squeezes_come_back(hardening):
     block = squeezes("block", {"sensor": "ideal", "pad_stiffness_n_m": 6000.0, "pad_hardening_m": hardening})
     config, said = with_fingertips_of_block(SimConfig(sensor="ideal"), ready(block))
@@ -38,7 +40,6 @@ def test_the_fingertips_of_known_squeezes_come_back(hardening):
         assert "at 1 mm" in said
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("gripper", [{"sensor": "ideal"}, {"sensor": "pads"}])
 def test_a_delay_of_which_the_settings_do_not_know_does_not_bias_the_fingertips(gripper):
     config, soft = SimConfig(**gripper), {**gripper, "pad_stiffness_n_m": 6000.0}
@@ -58,14 +59,12 @@ def test_a_delay_of_which_the_settings_do_not_know_does_not_bias_the_fingertips(
     assert "of the settings" in said
 
 
-@pytest.mark.slow
 def test_a_squeeze_of_nothing_is_refused():
     (empty,) = squeezes("none", {"sensor": "ideal"}, 1)
     with pytest.raises(ConfigError, match="nothing was touched"):
         _settings(SimConfig(sensor="ideal"), [empty], [empty])
 
 
-@pytest.mark.slow
 def test_an_object_is_identified_behind_the_fingertips_of_the_block():
     scene = 'width_m = 0.05\n[[terms]]\ntype = "elastic"\nk1_n_m = 1500.0\n'
     gripper = {"sensor": "ideal", "pad_stiffness_n_m": 5000.0}

@@ -268,6 +268,7 @@ def test_a_thing_that_is_squeezed_beside_what_measures_ends_the_grasp(grasped, t
 FAR = "<body name='far' pos='0.5 0 0'><site name='far'/></body>"
 
 
+@pytest.mark.slow
 @every_case(
     ("changed", "added", "widths"),
     [

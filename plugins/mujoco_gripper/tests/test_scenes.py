@@ -27,6 +27,7 @@ def in_scene(grasped, scene_file):
     return grasp
 
 
+@pytest.mark.slow
 def test_a_block_is_lifted_from_the_table_as_far_as_the_arm_moves_and_put_down_again(in_scene):
     trial = in_scene('thing = "block"', "table = true", LIFT_AND_PUT_DOWN, hold_s=1.4)
     assert trial.outcome.words == "steady"

@@ -32,6 +32,7 @@ def test_a_shake_begins_and_ends_at_rest_and_stays_within_its_amplitude(t_s, cyc
         assert shake.place_m(t_s) == 0.0
 
 
+@pytest.mark.slow
 def test_the_gripper_follows_the_shake_and_tells_it(scene_file):
     shake = ("[shake]", "amplitude_m = 0.01", "frequency_hz = 4.0", "start_s = 0.0")
     gripper = backend(object=scene_file('thing = "block"', *shake), spread=False)

@@ -9,6 +9,7 @@ from graspsense_mujoco_gripper.config import MujocoConfig
 from graspsense_mujoco_gripper.gripper_file import Finger, PalmSensor
 from graspsense_mujoco_gripper.prepared import prepare
 
+pytestmark = pytest.mark.slow
 CELL_N_M = 1500.0
 STEP_S = 0.00033334
 RIGID = 'solref="0.002 1" solimp="0.99 0.999 0.0001"'
@@ -60,7 +61,6 @@ def test_a_cell_image_is_the_pressure_of_a_bed_of_springs(tmp_path):
     assert reading.frame.force_left_n == pytest.approx(image.sum())
 
 
-@pytest.mark.slow
 def test_the_palm_feels_gravity_and_the_motion_of_the_fingers():
     backend = opened("none")
     still = [backend.read(1.0).signals.acceleration for _ in range(200)]
@@ -84,7 +84,6 @@ def test_a_thing_that_is_filled_weighs_more(scene):
     assert sum(masses) == pytest.approx(0.15 + 0.3)
 
 
-@pytest.mark.slow
 def test_the_table_rises_as_the_scene_says(scene):
     backend = scene("table_height = [[0.0, 0.0], [0.2, 0.02]]")
     resting_m = float(backend._data.mocap_pos[0, 2])
@@ -92,7 +91,6 @@ def test_the_table_rises_as_the_scene_says(scene):
     assert backend._data.mocap_pos[0, 2] - resting_m == pytest.approx(0.02)
 
 
-@pytest.mark.slow
 def test_roughness_disturbs_cells_that_slide_and_no_others(scene):
     backend = scene("friction = 0.05", "roughness_m = 4e-5")
     still = [squeezed(backend, 0.0395, 800 if k == 0 else 1).frame.force_left_n for k in range(100)]
@@ -127,7 +125,6 @@ def bumped(backend):
     return np.array(edges)
 
 
-@pytest.mark.slow
 def test_a_bump_gives_the_edge_of_the_finger_the_momentum_of_the_ball(scene):
     ball = ("mass_kg = 0.02", "speed_m_s = 0.5", "touch_s = 0.03")
     left, right = bumped(scene("[bump]", "t_s = 0.2", *ball)).T
@@ -137,12 +134,10 @@ def test_a_bump_gives_the_edge_of_the_finger_the_momentum_of_the_ball(scene):
     assert not right.any()
 
 
-@pytest.mark.slow
 def test_edges_do_not_feel_a_bump_into_the_thing(scene):
     assert not bumped(scene("[bump]", "t_s = 0.2", 'at = "thing"', "speed_m_s = 0.5")).any()
 
 
-@pytest.mark.slow
 def test_walls_have_a_soft_contact_with_cells_and_a_stiff_one_else():
     stiff, soft = (prepare(MujocoConfig(file=file, object="cup"), 1e-3) for file in ("", "soft_pads"))
     for prepared, contact_s in ((stiff, 0.001), (soft, 0.004)):

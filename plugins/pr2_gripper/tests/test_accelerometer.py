@@ -83,6 +83,7 @@ def opened_and_read(near):
     return read
 
 
+@pytest.mark.slow
 def test_every_sample_that_the_board_sends_arrives(monkeypatch, opened_and_read):
     words = []
 

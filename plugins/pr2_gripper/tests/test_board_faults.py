@@ -55,6 +55,7 @@ def faulty_reports(board, **faults):
     return reports(board(faults=FaultConfig(**faults)))
 
 
+@pytest.mark.slow
 @every_case(("kind", "side"), [("stuck", "left"), ("numb", "right"), ("zero", "both")])
 def test_cells_of_a_fingertip_go_wrong_from_a_time_on(board, healthy, kind, side):
     faulty = faulty_reports(board, pad_fault=kind, pad_side=side, pad_at_s=AT_S)

@@ -34,6 +34,7 @@ def shell(tmp_path):
     return call
 
 
+@pytest.mark.slow
 def test_stored_tare_has_its_time_and_its_hash_stands_in_the_trial(shell, tmp_path):
     _, tare, _ = shell("calibrate tare", "--images", "12")
     stored = read_calibration(tmp_path / "EMULATED" / "tare.json")

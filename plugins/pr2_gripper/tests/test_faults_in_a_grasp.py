@@ -3,6 +3,7 @@
 import gripper_faults
 import numpy as np
 import pytest
+from attrs import evolve
 from cases import every_case
 from gripper_faults import FAULTS
 
@@ -17,6 +18,7 @@ from graspsense.core.values.features import FeatureTable
 from graspsense.evaluation.doubt import calibrated
 from graspsense_pr2_gripper.config import FaultConfig
 
+pytestmark = pytest.mark.slow
 CEILING_N = 1.25 * 20.0 + 7.0
 """The effort of a grasp with the usual probing force: a quarter more, and the declared friction."""
 TELLS_NOTHING = {"hold", "squeeze"}
@@ -51,7 +53,6 @@ def grasped(controller="hybrid", seed=0, body=NEAR, **faults):
     return gripper_faults.grasped(law, FaultConfig(**faults), seed, **body)
 
 
-@pytest.mark.slow
 def test_a_fault_in_the_squeeze_crushes_nothing_and_without_a_fault_nothing_is_told():
     healthy = grasped()
     at_s = gripper_faults.moments(healthy)["squeeze"]
@@ -82,13 +83,12 @@ def test_of_a_fingertip_that_fails_in_the_squeeze_the_cause_alone_is_told(fault,
         assert grasp.reason == grasp.warnings[0]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("controller", "faults", "sides"),
     [
-        ("hybrid", FAULTS, ("left", "right")),
-        ("velocity", FAULTS[::2], ("right",)),
-        ("force", FAULTS[1::2], ("right",)),
+        ("hybrid", FAULTS, ("left",)),
+        ("velocity", FAULTS[::3], ("right",)),
+        ("force", FAULTS[2::3], ("right",)),
     ],
 )
 def test_every_fault_in_every_phase_crushes_nothing(controller, faults, sides):
@@ -106,10 +106,12 @@ def test_every_fault_in_every_phase_crushes_nothing(controller, faults, sides):
             check(row, healthy)
 
 
-@pytest.mark.slow
-def test_hostile_laws_crush_nothing():
+def test_hostile_laws_crush_nothing(monkeypatch):
+    # The one that oscillates reaches the object after 10 s, and the ceiling within a second of it.
+    monkeypatch.setattr(gripper_faults, "RUN", evolve(gripper_faults.RUN, opening_timeout_s=1.0))
     rows = list(gripper_faults.hostile())
     assert len(rows) == 8
+    assert sum(row.largest_effort_n == CEILING_N for row in rows) == 3
     for row in rows:
         assert row.largest_effort_n <= CEILING_N, row
         # The ceiling less the friction of the drive.
@@ -142,7 +144,6 @@ def test_a_pad_that_is_known_to_be_bad_refuses_the_grasp():
     assert grasp.report["largest_effort_n"] == 0.0
 
 
-@pytest.mark.slow
 def test_a_picture_and_a_notebook_show_the_reason_and_the_warnings():
     from graspsense.report.grasp_picture import _words
 
@@ -161,7 +162,6 @@ def emulated_grasp(*options, **faults):
     ).grasp()
 
 
-@pytest.mark.slow
 def test_a_motor_that_reports_what_it_was_told_presses_nothing_with_more():
     grasp = grasped(
         body={}, motor_gain=3.0, motor_at_s=0.9, effort_report_gain=1.0 / 3.0, effort_report_at_s=0.9

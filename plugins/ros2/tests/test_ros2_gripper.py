@@ -10,6 +10,7 @@ from robots import OPTIONS, PATIENCE_S, STEPPED, InStep
 from graspsense.core.pipeline.pipeline import load_pipeline
 from graspsense.core.values.signals import Outcome
 
+pytestmark = pytest.mark.slow
 OBJECT_M = 0.05
 
 
@@ -29,7 +30,6 @@ def grasped(robot, monkeypatch):
     return grasp
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["GripperCommand", "ParallelGripperCommand"])
 def test_a_grasp_by_topics_and_action(grasped, kind):
     sound, trial = grasped(f"gripper.action_type={kind}", kind=kind)
@@ -44,7 +44,6 @@ def test_a_grasp_by_topics_and_action(grasped, kind):
     assert goals[-1]["position"] == pytest.approx(0.085)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("fault", "words"),
     [
@@ -64,7 +63,6 @@ def test_a_fault_of_a_topic_ends_the_grasp_and_opens_the_fingers(grasped, fault,
     assert faulty.goals()[-1]["position"] == 0.085
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("fault", "name"), [("", None), ("behind", "messages late"), ("twice", "messages repeated")]
 )
@@ -75,7 +73,6 @@ def test_messages_that_come_late_or_twice_are_told(grasped, fault, name):
     assert told == ({name} if name else set())
 
 
-@pytest.mark.slow
 def test_a_topic_that_stops_while_the_fingers_open_leaves_them_open(grasped):
     faulty, trial = grasped(phase="RELEASE", act=lambda fake: fake.fault("silent"))
 
@@ -83,7 +80,6 @@ def test_a_topic_that_stops_while_the_fingers_open_leaves_them_open(grasped):
     assert faulty.goals()[-1]["position"] == 0.085
 
 
-@pytest.mark.slow
 def test_a_robot_that_dies_ends_the_grasp(grasped):
     _, trial = grasped(act=lambda fake: fake.process.kill())
 
@@ -91,7 +87,6 @@ def test_a_robot_that_dies_ends_the_grasp(grasped):
     assert trial.report["told_to_open"] is False
 
 
-@pytest.mark.slow
 def test_goals_that_are_refused_end_the_grasp(grasped):
     _, trial = grasped(act=lambda fake: fake.fault("refuse"))
 
@@ -99,7 +94,6 @@ def test_goals_that_are_refused_end_the_grasp(grasped):
     assert "refuses" in trial.reason
 
 
-@pytest.mark.slow
 def test_a_program_that_is_killed_leaves_open_fingers(robot):
     fake = robot()
     words = [word for option in (*OPTIONS, "run.hold_s=100") for word in ("-o", option)]

@@ -1,6 +1,5 @@
 """The steps of a scene: what they cannot resolve, and that they have the accuracy."""
 
-import json
 import math
 
 import numpy as np
@@ -8,9 +7,8 @@ import pytest
 import random_scenes
 import regimes
 from attrs import evolve
-from click.testing import CliRunner
+from commands import answered
 
-from graspsense.cli.main import cli
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.accuracy.levels import PLAIN
 from graspsense_sim_gripper.run.accuracy.propose import grip_of, propose
@@ -48,9 +46,7 @@ def test_instances_share_the_steps_of_their_kind():
 
 
 def test_run_reports_each_decision_with_its_number():
-    done = CliRunner().invoke(cli, ["run", "--object", "can:full_open", "--json"])
-    assert done.exit_code == 0
-    report = json.loads(done.stdout)["report"]
+    report = answered("run", "--object", "can:full_open")["report"]
     selection = report["selection"]
     assert (selection["accuracy"], selection["fidelity"], report["resolved"]) == (0.01, "scene", True)
     assert selection["level"] == PLAIN[0].level(0.01)._asdict()

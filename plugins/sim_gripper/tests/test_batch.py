@@ -482,6 +482,7 @@ def test_drawing_and_measuring_are_compiled_for_many_grasps_or_if_their_code_is_
     assert results[0] == results[1]
 
 
+@pytest.mark.slow
 def test_room_is_made_on_the_way_without_beginning_again(monkeypatch):
     whole = many(["toy"], [3])[0]
     assert whole.model.chosen.steps.macro_tolerance > 0.0

@@ -6,6 +6,7 @@ import time
 from types import SimpleNamespace
 from typing import NamedTuple
 
+import pytest
 from cases import every_case
 
 from graspsense.core.components.entries import ConformanceCheckEntry
@@ -41,6 +42,7 @@ def defects(law=spring):
     return list(check_terms([[gel]]))
 
 
+@pytest.mark.slow
 def test_a_sound_term_has_no_defect():
     assert defects() == []
     assert list(check_terms([list(TERMS.values())])) == []

@@ -66,6 +66,7 @@ def scenes_with(name):
     return scenes_of(CONFIGS[name])
 
 
+@pytest.mark.slow
 @every_case("config", CONFIGS)
 @given(st.sampled_from([name for name in NAMES if name != WIDE]), st.lists(SEEDS, min_size=1, max_size=3))
 @settings(max_examples=20)
@@ -101,6 +102,7 @@ def test_an_instance_that_does_not_fit_is_refused_as_it_is_by_itself():
     assert 0 < sum(map(bool, alone)) < 40
 
 
+@pytest.mark.slow
 def test_a_scene_is_drawn_of_which_one_grasp_does_not_fit():
     scenes = scenes_of(CONFIGS["ideal"])
     name = next(

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from batches import run_many
-from cases import slow
 
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.runner import run_grasp
@@ -12,6 +11,7 @@ from graspsense.plugin_api import create
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.backend import SimBackend
 
+pytestmark = pytest.mark.slow
 FEATURES = create("feature-set", "chitta")
 
 
@@ -25,7 +25,6 @@ def peaks(name, force_n, scene, seeds):
     return done, np.array([grasp.state.peak_n for grasp in done])
 
 
-@pytest.mark.slow
 def test_on_the_block_pure_force_slams_at_least_three_times_the_hybrids_peak():
     # Fig. 5 against Fig. 6, by the true force, at 23 N. The approach begins with an image of the pads, so opening
     # wider by up to 0.41 mm (41 ms at 10 mm/s) moves the contact through every phase of their clock.
@@ -44,19 +43,17 @@ def test_on_the_block_pure_force_slams_at_least_three_times_the_hybrids_peak():
     assert max(peak["hybrid"]) > 1.05 * min(peak["hybrid"])
 
 
-@pytest.mark.parametrize("eggs", [1, slow(100)])
-def test_the_egg_survives_the_hybrid_and_not_pure_force(eggs):
-    seeds = range(eggs)
+def test_the_egg_survives_the_hybrid_and_not_pure_force():
+    seeds = range(100)
     hybrid, gentle = peaks("hybrid", 20.0, "egg", seeds)
     slammed, _ = peaks("force", 20.0, "egg", seeds)
-    assert [grasp.state.contact.left.states[0].broken for grasp in hybrid] == [0] * eggs
-    assert [grasp.state.contact.left.states[0].broken for grasp in slammed] == [1] * eggs
+    assert [grasp.state.contact.left.states[0].broken for grasp in hybrid] == [0] * 100
+    assert [grasp.state.contact.left.states[0].broken for grasp in slammed] == [1] * 100
     # The margin: the weakest of these eggs breaks at 23 N, and no hybrid grasp goes over 22 N.
     assert gentle.max() < 22.0
     assert {grasp.outcome for grasp in slammed} == {Outcome.CRUSHED}
 
 
-@pytest.mark.slow
 def test_velocity_control_on_its_own_raises_its_effort_after_contact_and_crushes():
     result = grasp(create("controller", "velocity"), object="egg", open_gap_m=0.048)
     trace = result.trace
@@ -69,7 +66,7 @@ def test_velocity_control_on_its_own_raises_its_effort_after_contact_and_crushes
     assert result.outcome is Outcome.CRUSHED
 
 
-@pytest.mark.parametrize("name", ["force", slow("hybrid")])
+@pytest.mark.parametrize("name", ["force", "hybrid"])
 def test_a_force_below_breakaway_does_not_move_the_gripper_at_all(name):
     options = {"probing_force_n": 6.0, "move_timeout_s": 0.3}
     if name == "hybrid":
@@ -81,7 +78,6 @@ def test_a_force_below_breakaway_does_not_move_the_gripper_at_all(name):
     assert result.outcome is Outcome.NOTHING_THERE
 
 
-@pytest.mark.slow
 def test_closed_loop_force_settles_at_the_force_asked_for():
     controller = create("controller", "hybrid", loop="closed", probing_force_n=5.0, steady_timeout_s=8.0)
     result = grasp(controller, object="toy", spread=False, open_gap_m=0.06)
@@ -89,7 +85,6 @@ def test_closed_loop_force_settles_at_the_force_asked_for():
     assert FEATURES.extract(result.trace)["f_steady"] == pytest.approx(5.0, abs=0.3)
 
 
-@pytest.mark.slow
 def test_a_ramp_softens_the_switch():
     hard, ramped = (
         grasp(create("controller", "hybrid", ramp_s=ramp), spread=False, object="block", open_gap_m=0.033)
@@ -105,18 +100,17 @@ def test_a_ramp_softens_the_switch():
 @pytest.mark.parametrize(
     ("config", "law", "outcome"),
     [
-        slow({"object": "none"}, {}, Outcome.NOTHING_THERE),
+        ({"object": "none"}, {}, Outcome.NOTHING_THERE),
         ({"object": "can:full_closed", "open_gap_m": 0.060}, {}, Outcome.TOO_WIDE),
         ({"object": "odwalla:empty_open", "open_gap_m": 0.064}, {}, Outcome.STEADY),
         # A slow approach stretches its time out.
-        slow({"object": "block"}, {"closing_speed_m_s": 0.002}, Outcome.STEADY),
+        ({"object": "block"}, {"closing_speed_m_s": 0.002}, Outcome.STEADY),
     ],
 )
 def test_outcomes(config, law, outcome):
     assert grasp(create("controller", "hybrid", **law), **config).outcome is outcome
 
 
-@pytest.mark.slow
 def test_the_states_of_a_bottle_lie_where_the_authors_tree_splits_them():
     # The tree learned on the robot (personalrobots-pkg, gripper_realtime_closed_loop.py): delta_t over 0.542 s is
     # full and open; p_steady at or under 49.578 mm is empty and open. These two the catalogue was fitted to.

@@ -92,6 +92,7 @@ def test_with_the_trend_of_the_one_before_several_are_of_fourth_order(case):
     assert errors[8, True] < 0.7 * errors[8, False]
 
 
+@pytest.mark.slow
 @every_case("scene", ["toy", "odwalla:full_open", "water:empty_closed"])
 def test_a_step_that_is_taken_is_as_exact_as_its_tolerance_says(scene):
     plant, start = squeezing(scene)

@@ -1,6 +1,5 @@
 """Scenes of one's own: read strictly, held fast or free, explained, and with terms of somebody else's."""
 
-import json
 import math
 from typing import NamedTuple
 
@@ -8,10 +7,9 @@ import numpy as np
 import pytest
 from batches import run_many
 from cases import every_case
-from click.testing import CliRunner
+from commands import answered, printed
 from unverified import sample, unverified_setup
 
-from graspsense.cli.main import cli
 from graspsense.core.components.registry import IsolatedPlugins
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.runner import run_grasp
@@ -196,6 +194,7 @@ def explained(name, seed=0):
     return run_grasp(SimBackend(SimConfig(object=name, explain=True)), HYBRID, RunConfig(seed=seed))
 
 
+@pytest.mark.slow
 def test_the_explanation_adds_up_to_the_force_that_was_felt():
     grasp = explained("odwalla:full_closed", seed=3)
     model = grasp.report["model"]
@@ -223,14 +222,13 @@ def test_the_explanation_leaves_out_what_happens_in_a_released_object():
 
 @pytest.mark.slow
 def test_run_explains_the_model_in_the_terminal_and_in_json():
-    shown = CliRunner().invoke(cli, ["run", "--object", "leaking_bottle", "-o", "gripper.explain=true"])
-    assert shown.exit_code == 0
-    table = shown.output[shown.output.index("model       peak force 1") :].splitlines()
+    shown = printed("run", "--object", "leaking_bottle", "-o", "gripper.explain=true")
+    table = shown[shown.index("model       peak force 1") :].splitlines()
     assert table[1].split()[:2] == ["TERM", "PEAK"]
     assert [line.split()[0] for line in table[2:4]] == ["elastic", "gas"]
     assert "relaxes in 5 s" in table[3]
-    none = CliRunner().invoke(cli, ["run", "--object", "none", "--explain-model", "--json"])
-    assert json.loads(none.stdout)["report"]["model"] == {"touched": False, "terms": [], "without": []}
+    none = answered("run", "--object", "none", "--explain-model")
+    assert none["report"]["model"] == {"touched": False, "terms": [], "without": []}
 
 
 # ---------------------------------------------------------------------------------- somebody else's term
@@ -270,8 +268,8 @@ GEL = f'{FIRST_TERM} = "gel"\nk_n_m = 1000.0\nthickness_m = 0.02\nlimit_n = 100.
 
 
 @pytest.mark.usefixtures("lab_terms")
-@pytest.mark.parametrize("compiled", [False, pytest.param(True, marks=pytest.mark.slow)])
-def test_a_term_of_another_distribution_is_composed_and_checked_like_ours(compiled):
+@pytest.mark.slow
+def test_a_term_of_another_distribution_is_composed_and_checked_like_ours():
     config = SimConfig(spread=False, sensor="ideal", open_gap_m=0.052)
     ill = GEL.replace("limit_n = 100.0", "limit_n = 5.0")
     assert find(GEL.replace('"gel"', '"lab-terms/gel"')).terms == find(GEL).terms
@@ -280,7 +278,6 @@ def test_a_term_of_another_distribution_is_composed_and_checked_like_ours(compil
     (done,), (failed,) = (run_many(config, HYBRID, [scene], [0], compiled=False) for scene in (GEL, ill))
     assert (done.outcome.name, failed.outcome.name) == ("STEADY", "ABORTED")
     assert "term 'lab-terms/gel'" in failed.reason
-    if compiled:
-        (fast,), (also,) = (run_many(config, HYBRID, [scene], [0], compiled=True) for scene in (GEL, ill))
-        assert np.array_equal(fast.trace.gap_m, done.trace.gap_m)
-        assert also.reason == failed.reason
+    (fast,), (also,) = (run_many(config, HYBRID, [scene], [0], compiled=True) for scene in (GEL, ill))
+    assert np.array_equal(fast.trace.gap_m, done.trace.gap_m)
+    assert also.reason == failed.reason

@@ -108,6 +108,7 @@ def test_the_ideal_sensor_sees_contact_when_it_happens_the_pads_up_to_an_image_l
     assert max(delays) - min(delays) == pytest.approx(0.041, abs=0.008)
 
 
+@pytest.mark.slow
 def test_cells_that_are_not_there_read_their_offset_and_the_others_as_before():
     whole, middle = (
         grasp(object="odwalla:full_closed", spread=False, pad_cells=cells).trace for cells in (15, 3)

@@ -83,6 +83,7 @@ def test_the_example_of_a_term_runs():
     assert force == pytest.approx(10.0)
 
 
+@pytest.mark.slow
 def test_the_example_of_many_grasps_runs():
     names = {}
     few = example("Many grasps").replace("* 500", "* 1").replace("range(1000)", "range(2)")

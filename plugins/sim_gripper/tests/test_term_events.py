@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import re
 from typing import NamedTuple
@@ -11,10 +10,9 @@ import numpy as np
 import pytest
 from batches import run_many
 from cases import every_case, slow
-from click.testing import CliRunner
+from commands import graspsense
 from unverified import unverified_setup
 
-from graspsense.cli.main import cli
 from graspsense.plugin_api import create
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.compiled.compose import composed_move, composition, contact_solver, grasp_loop
@@ -206,10 +204,9 @@ def test_a_force_that_is_not_finite_ends_the_grasp_with_the_name_of_the_term(stu
     assert done.end() is done.end()  # computed once: its buffers are used again
 
 
+@pytest.mark.slow
 def test_a_single_grasp_names_the_term_too(stuff):
-    options = ["--json", "-o", "gripper.open_gap_m=0.052"]
-    shown = CliRunner().invoke(cli, ["run", "--object", stuff("nan"), *options])
-    trial = json.loads(shown.stdout)
+    trial = graspsense("run", "--object", stuff("nan"), "--json", "-o", "gripper.open_gap_m=0.052").json
     assert trial["outcome"] == "aborted"
     assert "term 'stuff'" in trial["reason"]
 

@@ -281,6 +281,7 @@ def test_every_term_has_a_sample_here():
     assert SAMPLES.keys() == TERMS.keys()
 
 
+@pytest.mark.slow
 @every_case("name", sorted(VARIANTS))
 @settings(max_examples=10, deadline=None)
 @given(st.lists(st.floats(0.0, 0.009), min_size=2, max_size=5), st.sampled_from([1e-5, 1e-3, 0.1]))

@@ -11,6 +11,7 @@ from graspsense.simulator_api import RunConfig
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.backend import SimBackend
 
+pytestmark = pytest.mark.slow
 SHELL = 'type = "elastic"\nk1_n_m = 1500.0\nk3_n_m3 = 2e6\n'
 CREEP = 'type = "maxwell"\nk_n_m = 300.0\ntau_s = 0.3\n'
 FOAM = 'type = "foam"\nforce_n = 8.0\nat_m = 0.01\nexponent = 1.5\narm1_n_m = 60.0\ntau1_s = 0.2\n'
@@ -42,7 +43,6 @@ def features_of(scene):
     return {**extracted, "peak": grasp.report["true_peak_force_n"]}
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("terms", [(SHELL, FOAM), (SHELL, SNAP, DRY)], ids=["foam", "snap"])
 def test_a_term_changes_what_a_scene_without_it_changes(terms):
     rows = explained(scene_of(*terms))
@@ -60,7 +60,6 @@ def test_a_term_changes_what_a_scene_without_it_changes(terms):
     assert max(abs(change["change"]) for change in row["changes"].values()) > 0.02
 
 
-@pytest.mark.slow
 def test_a_term_that_changes_nothing_can_be_left_out_and_one_that_breaks_the_grasp_is_said_to(capsys):
     rows = explained(scene_of(SHELL, DRY))
     print_without(rows.values(), 0.01)
@@ -74,7 +73,6 @@ def test_a_term_that_changes_nothing_can_be_left_out_and_one_that_breaks_the_gra
     assert "the outcome" in shown
 
 
-@pytest.mark.slow
 def test_changes_are_those_of_the_pipelines_own_features():
     backend = SimBackend(config_of(scene_of(SHELL, CREEP), explain=True))
     backend.expect_features(create("feature-set", "curve"))

@@ -112,6 +112,7 @@ def test_a_frame_is_one_read(emulated):
     driver.close()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("own_time")
 def test_it_closes_with_the_torque_limit_of_the_force_and_tells_load_current_and_supply(emulated):
     driver = opened(emulated(), jaw_length_m=0.1, stall_torque_nm=2.0)
@@ -185,12 +186,14 @@ def test_a_motor_that_is_not_asked_what_was_written_ends_the_grasp(emulated, wor
     assert not arm.state()["torque"]
 
 
+@pytest.mark.slow
 def test_a_program_that_is_killed_leaves_no_gripper_that_presses(emulated):
     arm = emulated()
     settings = {"port": arm.where, "reply_timeout_s": 10.0, "calibration": "none"}
     assert_a_killed_program_lets_go("so101", lambda: arm.state()["torque"], 8.0, **settings)
 
 
+@pytest.mark.slow
 @every_case("named", ["port", "by-id"])
 def test_a_gripper_whose_cable_is_plugged_in_again_no_longer_presses(emulated, tmp_path, monkeypatch, named):
     """A port that is found by its number, as in /dev/serial/by-id, has its name again."""
@@ -234,6 +237,7 @@ def test_a_late_or_repeated_reply_is_not_taken_for_that_of_the_next_request(emul
     bus.close()
 
 
+@pytest.mark.slow
 @every_case(
     ("keys", "emulator", "why"),
     [
