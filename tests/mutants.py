@@ -229,7 +229,8 @@ measuring(
     "values-are-floats", "changes sys.stdout", lambda peak, trace: setattr(sys, "stdout", StringIO()) or peak
 )
 measuring("values-fit-their-units", "convert it to its unit", lambda peak, trace: 1000.0 * peak)
-featuring("values-fit-their-units", "a measured value", values=(0.0,), reasons={})
+featuring("values-fit-their-units", "on an empty trace: return NaN", values=(0.0,), reasons={})
+measuring("values-fit-their-units", "without any channel", lambda peak, trace: -1.0 if len(trace) else peak)
 measuring("values-are-floats", "os._exit(0)", lambda peak, trace: os._exit(0))
 measuring(
     "values-are-floats",
@@ -392,6 +393,7 @@ class Texts(NamedTuple):
 
 _grasps = itertools.count()
 
+law("ends-every-grasp", "return the greatest force", asked_force_n=lambda self: 1.0)
 law("step-is-a-plain-function", "staticmethod(step)", step=lambda self, *given: step(*given))
 law("params-are-numbers", "annotated float and is 1", params=lambda self: WholeParams(EFFORT, 1))
 law("state-is-numbers", "hold plain floats and ints", init=lambda self: Texts(2, 0, "calm"))
@@ -607,6 +609,13 @@ def framing(check, says, **fields):
     giving(check, says)(lambda reading: reading._replace(frame=changed(reading.frame, fields)))
 
 
+def feeling(says, force):
+    """Keep a mutant whose pads give what a function makes of the frame and the sound force."""
+    pads = ("force_left_n", "force_right_n")
+    changes = {name: lambda frame, name=name: force(frame, getattr(frame, name)) for name in pads}
+    framing("squeezes-with-what-it-is-asked", says, **changes)
+
+
 def padding(check, says, **fields):
     """Keep a mutant whose images of the pads have these fields, which a function makes of the sound image."""
     giving(check, says)(lambda reading: reading._replace(pads=changed(reading.pads, fields)))
@@ -676,19 +685,10 @@ framing("rate-is-as-declared", "stands still", t_s=0.0)
 framing("gap-is-in-metres", "divide by 1000", gap_m=lambda frame: 1000.0 * frame.gap_m)
 framing("gap-is-in-metres", "divide by 100)", gap_m=lambda frame: 100.0 * frame.gap_m)
 framing("forces-are-in-newtons", "give newtons", force_left_n=3000.0)
-framing(
-    "squeezes-with-what-it-is-asked",
-    "is positive",
-    force_left_n=lambda frame: -frame.force_left_n,
-    force_right_n=lambda frame: -frame.force_right_n,
-)
+feeling("is positive", lambda frame, force: -force)
+feeling("give the force that lasts", lambda frame, force: force * (abs(frame.velocity_m_s) > 1e-4))
 # Forces in millinewtons, which are only seen where the fingers touch something.
-framing(
-    "squeezes-with-what-it-is-asked",
-    "give newtons",
-    force_left_n=lambda frame: frame.force_left_n * (1e3 if frame.force_left_n > 0.5 else 1.0),
-    force_right_n=lambda frame: frame.force_right_n * (1e3 if frame.force_left_n > 0.5 else 1.0),
-)
+feeling("give newtons", lambda frame, force: force * (1e3 if frame.force_left_n > 0.5 else 1.0))
 framing(VELOCITY_CHECK, "mm where the gap moved by", velocity_m_s=lambda frame: 1000.0 * frame.velocity_m_s)
 framing(VELOCITY_CHECK, "negative while it closes", velocity_m_s=lambda frame: -frame.velocity_m_s)
 framing("same-seed-same-frames", "draw everything from the seed", edge_left_n=lambda frame: _rng.random())

@@ -73,7 +73,9 @@ def tare(images: int, replace: bool, **asked: Any) -> None:
         stored = stored_zero(setup.stored["tare"]) if "tare" in setup.stored else None
         counts_per_n = _counts_per_n(setup)
         taken = unloaded_images(setup.rig, images, timeout_s=10.0 + images)
-        left, right = calibration.tare(taken, counts_per_n, _first_facing(setup), stored)
+        facing = _fingertips(setup).facing  # the first cell on the gripping face is taken
+        first_facing = facing.index(True) if True in facing else 0
+        left, right = calibration.tare(taken, counts_per_n, first_facing, stored)
         if stored is None and not replace:
             setup.backend.tare(taken)
         data = {"left": list(left), "right": list(right), "images": len(taken)}
@@ -154,11 +156,8 @@ def friction(gaps: int, narrowest_m: float, replace: bool, **asked: Any) -> None
         measured = breakaways(
             setup.rig, [narrowest_m + i * step_m for i in range(gaps)], setup.first_effort_n
         )
-        data = {
-            "gap_m": [breakaway.gap_m for breakaway in measured],
-            "closing_n": [breakaway.closing_n for breakaway in measured],
-            "opening_n": [breakaway.opening_n for breakaway in measured],
-        }
+        names = ("gap_m", "closing_n", "opening_n")
+        data = {name: [getattr(breakaway, name) for breakaway in measured] for name in names}
         _store(setup, "friction", data)
         rows = [(f"{a * 1e3:.1f}", f"{b:.2f}", f"{c:.2f}") for a, b, c in measured]
         echo_table(("GAP, mm", "CLOSING, N", "OPENING, N"), rows)
@@ -223,12 +222,6 @@ def _cell(number: float) -> int:
     if not number.is_integer():
         raise ConfigError(f"cell {number} is not a whole number: cells are numbered from 0 on")
     return int(number)
-
-
-def _first_facing(setup: _Setup) -> int:
-    """Return the number of the first cell on the gripping face, which its declaration states. Raises ConfigError."""
-    facing = _fingertips(setup).facing
-    return facing.index(True) if True in facing else 0
 
 
 def _fingertips(setup: _Setup) -> TactileArray:

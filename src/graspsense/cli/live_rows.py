@@ -49,14 +49,14 @@ class LiveRows:
         share = min(max(0.0, frame.gap_m / self._widest_m), 1.0) if self._widest_m else 0.0
         bar = block(sys.stderr) * round(self._bar * share)
         talk(
-            f"{frame.t_s:7.3f}  {_phase_name(phase):<10}{_millimetres(frame.gap_m)}  {bar:<{self._bar}}"
+            f"{frame.t_s:7.3f}  {Phase(phase).name.lower():<10}{_millimetres(frame.gap_m)}  {bar:<{self._bar}}"
             f"{_newtons(frame.force_left_n)} {_newtons(frame.force_right_n)}"
         )
 
     def event(self, event: GraspEvent) -> None:
         """Print a prediction that was made while the grasp goes on."""
         if event.source == "model":
-            talk(f"{event.t_s:7.3f}  {_phase_name(event.phase):<10}{event.what}")
+            talk(f"{event.t_s:7.3f}  {event.phase.name.lower():<10}{event.what}")
 
 
 def _millimetres(gap_m: float) -> str:
@@ -65,7 +65,3 @@ def _millimetres(gap_m: float) -> str:
 
 def _newtons(force_n: float) -> str:
     return f"{force_n:z7.2f} N" if force_n == force_n else f"{'-':>7}  "
-
-
-def _phase_name(phase: int) -> str:
-    return Phase(phase).name.lower()

@@ -254,7 +254,8 @@ def _report(error: BaseException, arguments: Sequence[str]) -> int:
 
         message, code = message_of(error), ExitCode.WRONG_USE
         if isinstance(error, click.UsageError) and error.ctx is not None:
-            message += f"\n  {error.ctx.command_path} --help shows what there is"
+            below = ", ".join(getattr(error.ctx.command, "commands", ()))
+            message += f"\n  {error.ctx.command_path} --help shows what there is{below and f': {below}'}"
     elif isinstance(error, OSError):
         place = f": {error.filename}" if error.filename else ""
         message, code = f"{error.strerror or error}{place}", ExitCode.WRONG_USE

@@ -82,8 +82,7 @@ def show(name: str) -> None:
     texts = [_status_text(status) for status in statuses] + [
         _component_text(component) for component in components
     ]
-    for number, text in enumerate(texts):
-        echo(f"\n{text}" if number else text, indent=4)
+    echo("\n\n".join(texts), indent=4)
 
 
 @plugins.command()
@@ -253,12 +252,8 @@ def _settings(options: Sequence[str]) -> dict[str, Any]:
 
     layers, complaints = option_layers(options)
     if complaints:
-        raise ConfigError(
-            "\n".join(
-                complaint.replace("TABLE.KEY=VALUE, as in -o run.seed=3", "KEY=VALUE")
-                for complaint in complaints
-            )
-        )
+        example = "TABLE.KEY=VALUE, as in -o run.seed=3"
+        raise ConfigError("\n".join(complaints).replace(example, "KEY=VALUE"))
     merged = Merged()
     for layer in layers:
         merged.add((), layer.values, layer)

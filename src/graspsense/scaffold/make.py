@@ -176,7 +176,7 @@ def words_of(name: str, roles: Sequence[str]) -> dict[str, str]:
         "needs": "".join(f', "{need}"' for need in needs),
         "tests": ", ".join(f'"{test}"' for test in tests),
         "core": f"graspsense>={major}.{minor},<{major}.{minor + 1}",
-        "imports": _imports([*sorted(entries), "hookimpl"]),
+        "imports": "".join(f"    {name},\n" for name in (*sorted(entries), "hookimpl")),
     }
     words["first"] = "\n    ".join(_first(kinds, {**words, "scene": "scene.toml"}))
     return words
@@ -217,13 +217,6 @@ def _kinds(roles: Sequence[str]) -> dict[str, ScaffoldKind]:
 def _together(kinds: Mapping[str, ScaffoldKind]) -> bool:
     """Return whether the package ships a pipeline, which it does if a pipeline can select several of its parts."""
     return len(kinds.keys() & TABLE_OF_ROLE) > 1
-
-
-def _imports(names: Sequence[str]) -> str:
-    line = f"from graspsense.plugin_api import {', '.join(names)}"
-    if len(line) <= 100:
-        return line
-    return "\n".join(["from graspsense.plugin_api import (", *(f"    {name}," for name in names), ")"])
 
 
 def _first(kinds: Mapping[str, ScaffoldKind], words: Mapping[str, str]) -> list[str]:

@@ -9,6 +9,8 @@ from math import ceil, isfinite, isnan, nan
 from statistics import fmean, median
 from typing import Any, Final
 
+import numpy as np
+
 from graspsense.core.components.entries import KINDS
 from graspsense.core.components.roles import SensorBackend
 from graspsense.core.components.run_config import RunConfig
@@ -65,10 +67,9 @@ def describes_itself(subject: Subject) -> None:
             f"a gripper that can be commanded has limits: effort {info.effort_limit_n} N, speed "
             f"{info.speed_limit_m_s} m/s",
         )
-        demand(
-            info.speed_limit_m_s <= 5.0,
-            f"speed_limit_m_s is {info.speed_limit_m_s}: that is a speed in mm/s; give m/s",
-        )
+        for name, most, unit in (("speed_limit_m_s", 5.0, "m/s"), ("effort_limit_n", 5000.0, "N")):
+            limit = getattr(info, name)
+            demand(limit <= most, f"{name} is {limit:g}: that is in m{unit}; give {unit}")
 
 
 def opens_and_closes_in_time(subject: Subject) -> None:
@@ -237,25 +238,31 @@ def _gentle_grasp(subject: Subject) -> Grasp:
 
 
 def squeezes_with_what_it_is_asked(subject: Subject) -> None:
-    """In the hold, no force exceeds the limit that was commanded, or the least that the gripper declares.
+    """In the hold, no force exceeds the limit that was commanded, or the least that it declares; pads feel on.
 
     Of a grasp that never comes to rest, it is the last half second of the squeeze that counts.
     """
     if subject.session.info.opening is None:
         raise CheckSkipped("a recording cannot be commanded")
     grasp, backend = _gentle_grasp(subject), subject.create()
-    held = grasp.trace.phase == HOLD
+    held, squeezed = grasp.trace.phase == HOLD, grasp.trace.phase == SQUEEZE
     if not held.any():
-        held = grasp.trace.phase == SQUEEZE
+        held = squeezed
         if not held.any():
             raise CheckSkipped("the fingers did not close")
-        held &= grasp.trace.t_s >= grasp.trace.t_s[held][-1] - REST_S
+        held = held & (grasp.trace.t_s >= grasp.trace.t_s[held][-1] - REST_S)
     kind = kind_of(subject.entry.accepts)
     asked_n = max(FORCE_N if kind == FORCE else EFFORT_N, backend.least_force_n)
     for name in ("effort_n", "force_left_n", "force_right_n"):
-        values = getattr(grasp.trace, name)[held]
-        known = values[values == values].tolist()
+        values = getattr(grasp.trace, name)
+        known = values[held & (values == values)].tolist()
         most_n = median(known) if known else 0.0
+        felt_n = float(np.nan_to_num(values[squeezed]).max(initial=0.0))
+        demand(
+            name == "effort_n" or felt_n < 2.0 or most_n > 0.1 * felt_n,
+            f"its {name} is {felt_n:.3g} while the fingers close on something, and {most_n:.3g} while they hold it: "
+            "give the force that lasts, not its change",
+        )
         demand(
             most_n >= -1.0 or name == "effort_n",
             f"its {name} is {most_n:.3g} when it squeezes: the force on a pad that is pressed is positive",

@@ -21,6 +21,7 @@ from graspsense.core.control.free_motion import FreeMotion
 from graspsense.core.grasp.protection.effort_ceiling import MARGIN
 from graspsense.core.grasp.runner import run_uninterrupted
 from graspsense.core.values.channel import Channel
+from graspsense.core.values.faults import LIMITED
 from graspsense.core.values.signals import (
     APPROACH,
     CHANNEL_OF_FIELD,
@@ -39,7 +40,7 @@ from graspsense.core.values.signals import (
     no_pads,
 )
 from graspsense.testing.checks import CheckFailed, CheckSkipped, demand, raises_nothing
-from graspsense.testing.model_gripper import CELLS, DT_S, OBJECTS, model_gripper
+from graspsense.testing.model_gripper import CELLS, DT_S, FRICTION_N, OBJECTS, model_gripper
 from graspsense.testing.subject import Subject
 
 LONGEST_TRIED_S: Final = 4.0
@@ -530,21 +531,29 @@ def phases_are_in_order(subject: Subject) -> None:
 
 
 def ends_every_grasp(subject: Subject) -> None:
-    """With a soft object, a hard object and nothing, it ends the grasp by itself with a valid outcome."""
-    for object_name in OBJECTS:
-        gripper = model_gripper(_all_channels(subject), object_name)
-        # If the controller does not end the grasp, the runner ends it after three more opening times.
-        grasp = run_uninterrupted(gripper, subject.create(), RunConfig(grasp_timeout_s=LONGEST_S))
+    """With a soft object, a hard object and nothing, it ends the grasp by itself, and holds as it asks to."""
+    law = subject.create()
+    asked_n = law.asked_force_n()
+    # If the controller does not end the grasp, the runner ends it after three more opening times.
+    ceiling_n = None if asked_n is None else MARGIN * asked_n + FRICTION_N
+    run = RunConfig(grasp_timeout_s=LONGEST_S, effort_ceiling_n=ceiling_n)
+    for object_name, (width_m, _) in OBJECTS.items():
+        grasp = run_uninterrupted(model_gripper(_all_channels(subject), object_name), law, run)
+        end = f"with {object_name} between the fingers the grasp ended as {grasp.outcome.words}"
         demand(
             grasp.outcome not in (Outcome.ABORTED, Outcome.DEVICE_LOST, Outcome.RUNNING),
-            f"with {object_name} between the fingers the grasp ended as {grasp.outcome.words}: "
-            f"{grasp.reason}. Let the state's `outcome` leave RUNNING, after {LONGEST_S:g} s at the latest",
+            f"{end}: {grasp.reason}. Let the state's `outcome` leave RUNNING, after {LONGEST_S:g} s at the latest",
         )
-        closest_m, width_m = float(grasp.trace.gap_m.min()), OBJECTS[object_name][0]
+        lowered = [told for told in grasp.warnings if told.startswith(LIMITED) and "ceiling" in told]
+        demand(
+            asked_n is None or not lowered,
+            f"{end}; it squeezes or holds with more than {ceiling_n} N, and asked_force_n returns {asked_n}: return "
+            "the greatest force that it commands, in N",
+        )
+        closest_m, steady = float(grasp.trace.gap_m.min()), grasp.outcome == Outcome.STEADY
         missed = width_m > 0.0 and grasp.outcome == Outcome.NOTHING_THERE
         demand(
-            closest_m < width_m or not (missed or grasp.outcome == Outcome.STEADY),
-            f"with {object_name} between the fingers, {width_m * 1e3:g} mm wide, the grasp ended as "
-            f"{grasp.outcome.words}, and the fingers came no closer than {closest_m * 1e3:.1f} mm: close them until "
-            "they touch, and hold only what was touched",
+            closest_m < width_m or not (missed or steady),
+            f"{end}, {width_m * 1e3:g} mm wide, and the fingers came no closer than {closest_m * 1e3:.1f} mm: close "
+            "them until they touch, and hold only what was touched",
         )

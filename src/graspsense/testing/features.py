@@ -33,8 +33,8 @@ from graspsense.testing.subject import Subject, elsewhere
 
 CUTS: Final = 48
 LONGEST_S: Final = 2.0
-FAR_BEYOND: Final = 200.0
-"""A factor that a sum over frequencies does not reach, and a unit with the prefix milli exceeds."""
+FAR_BEYOND: Final = {"m": 200.0, "N": 200.0, "s": 3.0}
+"""Factors that a sum (over frequencies, of times) does not reach, and a unit with the prefix milli exceeds."""
 
 
 def _features(
@@ -137,22 +137,24 @@ def a_whole_grasp_has_features(subject: Subject) -> None:
 
 
 def values_fit_their_units(subject: Subject) -> None:
-    """No feature in m, N or s is far beyond what the grasp has of it; without a tick, only ratios have a value."""
+    """No feature in m, N or s is far beyond what the grasp has of it; of what was not measured, none has a value."""
     trace = _whole(subject)
     most = {"m": trace.gap_m.max(), "N": trace.force_left_n.max(), "s": trace.t_s[-1]}
     for name, unit, value in _values(_features(subject, trace)):
-        limit = FAR_BEYOND * most.get(unit, inf)
+        limit = FAR_BEYOND.get(unit, 1.0) * most.get(unit, inf)
         demand(
             not abs(value) > limit,
             f"feature {name!r} is {value:g} {unit} in a grasp with gaps to {most['m']:.2g} m and forces to "
             f"{most['N']:.2g} N, of {most['s']:.2g} s: convert it to its unit, or declare the unit that it has",
         )
-    for name, unit, value in _values(_features(subject, trace.until(-1.0), "an empty trace")):
-        demand(
-            value != value or unit in ("1", "counts"),
-            f"feature {name!r} is {value:g} {unit} on an empty trace: return NaN with a reason where nothing was "
-            "measured; 0 would be taken for a measured value",
-        )
+    unmeasured = {which: evolve(each, command=each.command * nan) for which, each in _all(subject).items()}
+    for which, known in (("an empty trace", ()), ("a trace without any channel", ("s",))):
+        for name, unit, value in _values(_features(subject, unmeasured[which], which)):
+            demand(
+                value != value or unit in ("1", "counts", *known),
+                f"feature {name!r} is {value:g} {unit} on {which}: return NaN with a reason where nothing was "
+                "measured; 0 would be taken for a measured value",
+            )
 
 
 def _values(features: Features) -> Iterator[tuple[str, str, float]]:
@@ -265,7 +267,9 @@ def _of_each(k: int, trace: Trace, subject: Subject) -> Trace:
 
 def independent_of_the_start_of_the_clock(subject: Subject) -> None:
     """A shift of all times changes no feature beyond rounding."""
-    early, late = (_features(subject, trace) for trace in (_whole(subject), shifted(_whole(subject), 64.0)))
+    whole = _whole(subject)
+    exact = evolve(whole, t_s=np.round(whole.t_s * 2.0**30) / 2.0**30)  # whose differences are not rounded
+    early, late = (_features(subject, trace) for trace in (exact, shifted(exact, 64.0)))
     for name, a, b in zip(early.names, early.values, late.values, strict=True):
         demand(
             (a != a and b != b) or abs(a - b) <= 1e-6 * max(1.0, abs(a)),

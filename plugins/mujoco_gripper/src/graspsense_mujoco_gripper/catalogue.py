@@ -199,12 +199,12 @@ def thing_named(name: str, beside: Path = Path()) -> tuple[Thing, mujoco.MjSpec 
     if name.endswith(".xml"):
         path = beside / Path(os.path.expanduser(name))
         if not path.is_file():
-            raise UnknownName(f"gripper.object: there is no file {path}")
+            raise UnknownName(f"there is no file {path} (--object or gripper.object)")
         return Thing(summary=path.stem), read_spec(path)
     if name not in catalogue():
         raise UnknownName(
-            f"gripper.object: there is no thing {name!r}. Known: {', '.join(catalogue())}, none, the scenes tugged, "
-            "filled, placed and shaken, an MJCF file (.xml), "
+            f"no object named {name!r} (--object or gripper.object). Known: {', '.join(catalogue())}, none, the "
+            "scenes tugged, filled, placed and shaken, an MJCF file (.xml), "
             f"or a scene file (.toml).{suggestion(name, catalogue())}"
         )
     thing = catalogue()[name]
