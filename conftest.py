@@ -14,7 +14,7 @@ from hypothesis import HealthCheck, settings
 settings.register_profile(
     "any-machine",
     settings.default,
-    max_examples=settings.default.max_examples if os.environ.get("CI") else 25,
+    max_examples=settings.default.max_examples if os.environ.get("CI") else 15,
     deadline=None,
     suppress_health_check=[HealthCheck.too_slow],
 )
