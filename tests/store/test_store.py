@@ -270,7 +270,6 @@ def test_a_whole_recording_in_the_place_of_another_one_is_not_taken_for_it(store
     for read in (grasp.trace, lambda: stored_grasp(f"{store.folder}#1")):
         with pytest.raises(DataDamaged, match=f"{paths[0].name}.*aside"):
             read()
-    assert len(stored_grasp(f"{store.folder}#2")) == 30
 
 
 @pytest.mark.parametrize("log", [False, True], ids=["closed", "with a log"])
