@@ -222,7 +222,9 @@ def test_an_address_that_is_none_is_wrong_use(address):
         _host_and_port(address)
 
 
-def test_a_page_that_is_killed_loses_no_grasp(feed):
+def test_a_page_that_is_killed_loses_no_grasp():
+    feed = LiveFeed("graspsense.live.page_process", ["127.0.0.1", "0"])
+
     class Killer:
         def __init__(self):
             self.ticks = 0
@@ -236,6 +238,7 @@ def test_a_page_that_is_killed_loses_no_grasp(feed):
     trial = load_pipeline("default").grasp(sinks=[Killer(), feed])
     assert trial.outcome.words == "steady"
     assert trial.reason == ""
+    assert "incomplete" in feed.close()
 
 
 @every_case(("option", "module"), [("live", "websockets"), ("foxglove", "foxglove"), ("rerun", "rerun")])

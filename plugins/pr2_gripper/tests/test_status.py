@@ -187,7 +187,7 @@ def test_page_has_the_table_of_the_code():
 
 def test_what_a_grasp_cannot_do_without_has_a_limit_and_what_only_informs_has_none():
     endless = {bit.name for bit in status_bits(False) if bit.limit_s == math.inf}
-    assert endless == {"samples missed", "bad cell", "beyond load table", "command refused"}
+    assert endless == {"samples missed", "bad cell", "beyond load table", "command refused", "commands lost"}
     # The gaps between reports are summed over the whole grasp.
     short = [bit for bit in status_bits(False) if bit.name not in {*endless, "frames lost"}]
     assert all(0.0 < bit.limit_s <= 0.2 for bit in short)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from typing import Any, Final
 
 from attrs import asdict
@@ -92,10 +93,13 @@ class LiveFeed(Feed):
             self._process.communicate()
             return f"{self.name} did not end, and was stopped"
         last = out.splitlines()[-1:] or [b"{}"]
-        try:
-            return str(json.loads(last[0]).get("error", ""))
-        except (ValueError, AttributeError):
-            return ""
+        with suppress(ValueError, AttributeError):
+            if error := json.loads(last[0]).get("error"):
+                return str(error)
+        ended = self._broken or self._process.returncode
+        return (
+            f"{self.name} ended before the grasps did: what it shows or writes is incomplete" if ended else ""
+        )
 
 
 def grasp_values(device: DeviceInfo) -> dict[str, Any]:

@@ -37,6 +37,8 @@ ENCODER_WRONG: Final = 1 << 23
 """The motor angle lies outside of the stroke, or moved faster than the fingers can."""
 REPORTS_LOST: Final = 1 << 24
 """Reports before this one were lost, by their numbers."""
+COMMANDS_LOST: Final = 1 << 25
+"""The board has echoed none of the last commands."""
 
 ENDURED_CELLS: Final = 5
 """Number of cells on the face of a pad that may be dead: with a third of them, a force is up to a third too small."""
@@ -121,6 +123,11 @@ _COMMON: Final = (
         name="frames lost",
         meaning="reports did not arrive, so rates and times are less exact: check the cable and the USB hub",
         limit_s=GAPS_S,
+    ),
+    StatusBit(
+        mask=COMMANDS_LOST,
+        name="commands lost",
+        meaning="commands did not reach the board and an old one still applied: check the cable and the USB hub",
     ),
 )
 _ABSENT_MEANING: Final = (
