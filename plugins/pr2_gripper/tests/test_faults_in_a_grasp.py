@@ -135,8 +135,7 @@ def test_only_a_motor_that_is_reversed_leaves_the_fingers_closed(faults, ends):
 
 
 def test_commands_that_are_lost_are_told():
-    names = [warning.split(":")[0] for warning in grasped(drop_command=0.85).warnings]
-    assert "commands lost" in names
+    assert any(warning.startswith("commands lost") for warning in grasped(drop_command=0.85).warnings)
 
 
 def test_a_pad_that_is_known_to_be_bad_refuses_the_grasp():

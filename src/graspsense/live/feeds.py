@@ -42,23 +42,12 @@ class LiveFeed(Feed):
             super().__init__(module, arguments, QUEUE_BYTES)
         except SaveFailed as error:
             raise ConfigError(str(error)) from error
-        self.answer = self._first_answer()
+        said = self._first_line(START_TIMEOUT_S) or json.dumps({"error": f"{self.name} does not start"})
+        self.answer: Mapping[str, Any] = json.loads(said)
         """What the process found."""
         if "error" in self.answer:
             self.close()
             raise ConfigError(str(self.answer["error"]))
-
-    @property
-    def dropped(self) -> int:
-        """Messages that the process did not take."""
-        return self._dropped
-
-    def _first_answer(self) -> Mapping[str, Any]:
-        said = self._first_line(START_TIMEOUT_S)
-        if not said:
-            return {"error": f"the process {self.name} does not start"}
-        answer: Mapping[str, Any] = json.loads(said)
-        return answer
 
     def opened(self, device: DeviceInfo) -> None:
         """Begin a grasp with this gripper."""

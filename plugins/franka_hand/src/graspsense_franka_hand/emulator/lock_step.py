@@ -38,18 +38,27 @@ class LockStepHand(LockStepDevice[FrankaHand]):
 
     def newest(self, timeout_s: float) -> HandState | None:
         """Return the newest state that has come within this time, at least one period. Raises HandGone."""
-        until_s, faults = self._now_s + timeout_s, self._faults
+        until_s = self._now_s + timeout_s
         while True:
             self._now_s += 1.0 / RATE_HZ
             self._check()
             self.hand.look(self._now_s)
-            mood = faults.mood_at(self._now_s)
+            mood = self._faults.mood_at(self._now_s)
             if mood == "damaged":
                 raise HandGone("a state was damaged")
             self._count()
             if mood != "silent":
-                arrives_s = self._now_s + (faults.late_s if mood == "late" else 0.0)
-                self._coming.append(self._state()._replace(host_s=arrives_s))
+                self._coming.append(
+                    HandState(
+                        host_s=self._now_s + (self._faults.late_s if mood == "late" else 0.0),
+                        width_m=self.hand.width_m,
+                        widest_m=self.hand.widest_m,
+                        grasped=self.hand.grasped,
+                        temperature_c=float(TEMPERATURE_C),
+                        done=self._done,
+                        refused=self._refused,
+                    )
+                )
             newest = None
             while self._coming and self._coming[0].host_s <= self._now_s:
                 newest = self._coming.popleft()
@@ -71,17 +80,6 @@ class LockStepHand(LockStepDevice[FrankaHand]):
         """Stop the fingers, and release the body."""
         self.hand.ask(protocol.HandRequest(protocol.STOP, 0, ()), self._now_s)
         super().close()
-
-    def _state(self) -> HandState:
-        return HandState(
-            host_s=self._now_s,
-            width_m=self.hand.width_m,
-            widest_m=self.hand.widest_m,
-            grasped=self.hand.grasped,
-            temperature_c=float(TEMPERATURE_C),
-            done=self._done,
-            refused=self._refused,
-        )
 
     def _check(self) -> None:
         if self._now_s >= self._faults.unplug_at_s:
