@@ -56,7 +56,6 @@ def closing(k):
 @every_case(
     ("command", "gap_of", "seen"),
     [
-        (CLOSES, closing, []),
         (CLOSES, lambda k: closing(k) + 0.004 * (k >= 50), [50]),
         (CLOSES, lambda k: closing(k) - 0.004 * (k == 50), [50, 51]),
         (Command(VELOCITY, -0.02, 20.0, inf), lambda k: closing(k) - 0.004 * (k >= 50), [50]),

@@ -72,14 +72,12 @@ def approach(k):
 @every_case(
     ("way_m", "names"),
     [
-        (approach, set()),
         # Steps of a coarse encoder, and a gap that is measured for each third frame.
         (lambda k: in_steps(approach(k), 0.00037), set()),
-        (lambda k: in_steps(approach(k), 0.004), {"gap in steps"}),
+        (lambda k: in_steps(approach(k), 0.001), {"gap in steps"}),
         (lambda k: approach(k - k % 3), set()),
         # Each fifth frame is that before it.
         (lambda k: approach(k - (k % 5 == 0)), {"frames repeated"}),
-        (lambda k: approach(k - (k > 60 and k % 5 == 0)), {"frames repeated"}),
         (lambda k: approach(k - (k == 50)), set()),
         # Half as fast, in steps that are then coarse for it.
         (lambda k: in_steps(0.5 * (approach(k) + approach(min(k, 50))), 0.00015), set()),

@@ -354,7 +354,7 @@ def test_a_clock_that_is_slow_for_the_frames_that_come_is_told(sound_ticks, rate
     assert (names_of(faults), end) == ({("clock slow", False)} if told else set(), None)
 
 
-@every_case(("jump_s", "ends"), [(1.0, False), (4.0, True), (-0.1, False)])
+@every_case(("jump_s", "ends"), [(1.0, False), (4.0, True), (-0.1, False), (-3600.0, True)])
 def test_a_clock_that_jumps_is_told_and_ends_the_grasp_where_it_is_half_of_its_time(jump_s, ends):
     now = [reading(0.001 * k + jump_s * (k >= 2000), dt=0.001 + jump_s * (k == 2000)) for k in range(2100)]
     assert names_of(first_end(now, APPROACH)[0]) == {("clock jumps", ends)}

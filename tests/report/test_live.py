@@ -220,10 +220,9 @@ def test_an_address_that_is_none_is_wrong_use(address):
         _host_and_port(address)
 
 
-def test_a_page_that_is_killed_loses_no_grasp(feed):
+def test_a_page_that_is_killed_loses_no_grasp():
     class Killer:
-        def __init__(self):
-            self.ticks = 0
+        ticks = 0
 
         def take(self, reading, phase, command):
             self.ticks += 1
@@ -231,9 +230,10 @@ def test_a_page_that_is_killed_loses_no_grasp(feed):
                 os.kill(feed._process.pid, signal.SIGKILL)
                 feed._process.wait()
 
+    feed = LiveFeed("graspsense.live.page_process", ["127.0.0.1", "0"])
     trial = load_pipeline("default").grasp(sinks=[Killer(), feed])
-    assert trial.outcome.words == "steady"
-    assert trial.reason == ""
+    assert (trial.outcome.words, trial.reason) == ("steady", "")
+    assert "incomplete" in feed.close()
 
 
 @every_case(("option", "module"), [("live", "websockets"), ("foxglove", "foxglove"), ("rerun", "rerun")])

@@ -163,7 +163,7 @@ def test_who_is_released_is_not_pressed():
 
 
 @pytest.mark.slow
-@every_case(("mood", "at_s"), [("silent", 0.5), ("damaged", 2.0), ("silent", 3.0), ("damaged", 4.0)])
+@every_case(("mood", "at_s"), [("silent", 0.5), ("damaged", 2.0), ("late", 3.0), ("damaged", 4.0)])
 def test_a_hand_lost_in_a_grasp_ends_it(mood, at_s):
     options = [*EMULATED, f"gripper.faults.mood={mood}", f"gripper.faults.mood_at_s={at_s}"]
     trial = load_pipeline("franka", options=options).grasp()

@@ -79,7 +79,6 @@ def test_cells_of_a_fingertip_go_wrong_from_a_time_on(board, healthy, kind, side
 @every_case(
     ("faults", "bits"),
     [
-        ({"pad_fault": "absent", "pad_side": "left", "pad_at_s": AT_S}, LEFT_ABSENT),
         ({"pad_fault": "absent", "pad_side": "right", "pad_at_s": AT_S}, RIGHT_ABSENT),
         ({"pad_fault": "absent", "pad_side": "both", "pad_at_s": AT_S}, LEFT_ABSENT | RIGHT_ABSENT),
         ({"status_bits": 0x8005, "status_at_s": AT_S}, 0x8005),

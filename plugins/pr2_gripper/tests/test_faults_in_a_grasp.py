@@ -136,6 +136,10 @@ def test_only_a_motor_that_is_reversed_leaves_the_fingers_closed(faults, ends):
     assert (MAY_BE_CLOSED in grasp.reason) is (ends == "let go at")
 
 
+def test_commands_that_are_lost_are_told():
+    assert any(warning.startswith("commands lost") for warning in grasped(drop_command=0.85).warnings)
+
+
 def test_a_pad_that_is_known_to_be_bad_refuses_the_grasp():
     grasp = grasped(pad_fault="absent", pad_side="right")
     assert grasp.outcome.words == "aborted"

@@ -25,7 +25,7 @@ from graspsense_pr2_gripper.protocol import (
 from graspsense_pr2_gripper.status import (
     BAD_CELL,
     COMMAND_CLAMPED,
-    COMMAND_REFUSED,
+    COMMANDS_LOST,
     ENCODER_WRONG,
     LEFT_DEAD,
     OLD_IMAGE,
@@ -96,7 +96,7 @@ def test_no_frame_has_a_bit_that_is_not_declared(reported, image, swap, device_i
     )
 
 
-@every_case(("result", "bit"), [(0, 0), (1, 0), (CLAMPED, COMMAND_CLAMPED), (REFUSED, COMMAND_REFUSED)])
+@every_case(("result", "bit"), [(0, 0), (1, 0), (CLAMPED, COMMAND_CLAMPED), (REFUSED, COMMANDS_LOST)])
 def test_result_of_a_command_is_in_the_frame(result, bit, device_identity):
     assert measure(device_identity()).reading(report(command_result=result), None).frame.status == bit
 
@@ -187,7 +187,7 @@ def test_page_has_the_table_of_the_code():
 
 def test_what_a_grasp_cannot_do_without_has_a_limit_and_what_only_informs_has_none():
     endless = {bit.name for bit in status_bits(False) if bit.limit_s == math.inf}
-    assert endless == {"samples missed", "bad cell", "beyond load table", "command refused"}
+    assert endless == {"samples missed", "bad cell", "beyond load table", "commands lost"}
     # The gaps between reports are summed over the whole grasp.
     short = [bit for bit in status_bits(False) if bit.name not in {*endless, "frames lost"}]
     assert all(0.0 < bit.limit_s <= 0.2 for bit in short)

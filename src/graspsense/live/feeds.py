@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from typing import Any, Final
 
 from attrs import asdict
@@ -41,23 +42,12 @@ class LiveFeed(Feed):
             super().__init__(module, arguments, QUEUE_BYTES)
         except SaveFailed as error:
             raise ConfigError(str(error)) from error
-        self.answer = self._first_answer()
+        said = self._first_line(START_TIMEOUT_S) or json.dumps({"error": f"{self.name} does not start"})
+        self.answer: Mapping[str, Any] = json.loads(said)
         """What the process found."""
         if "error" in self.answer:
             self.close()
             raise ConfigError(str(self.answer["error"]))
-
-    @property
-    def dropped(self) -> int:
-        """Messages that the process did not take."""
-        return self._dropped
-
-    def _first_answer(self) -> Mapping[str, Any]:
-        said = self._first_line(START_TIMEOUT_S)
-        if not said:
-            return {"error": f"the process {self.name} does not start"}
-        answer: Mapping[str, Any] = json.loads(said)
-        return answer
 
     def opened(self, device: DeviceInfo) -> None:
         """Begin a grasp with this gripper."""
@@ -92,10 +82,13 @@ class LiveFeed(Feed):
             self._process.communicate()
             return f"{self.name} did not end, and was stopped"
         last = out.splitlines()[-1:] or [b"{}"]
-        try:
-            return str(json.loads(last[0]).get("error", ""))
-        except (ValueError, AttributeError):
-            return ""
+        with suppress(ValueError, AttributeError):
+            if error := json.loads(last[0]).get("error"):
+                return str(error)
+        ended = self._broken or self._process.returncode
+        return (
+            f"{self.name} ended before the grasps did: what it shows or writes is incomplete" if ended else ""
+        )
 
 
 def grasp_values(device: DeviceInfo) -> dict[str, Any]:

@@ -58,7 +58,8 @@ class Feed(TickMessages):
         self.ticks = 0
         """Ticks that were taken."""
         self._broken = False
-        self._deferred = self._dropped = 0
+        self._deferred = self.dropped = 0
+        """Messages that did not go at once, and that the process did not take."""
 
     def _first_line(self, timeout_s: float) -> bytes | None:
         """Return the first line that the process prints: empty if it ends without one, None if none comes in time."""
@@ -106,7 +107,7 @@ class Feed(TickMessages):
         if self._broken:
             return
         if len(waiting) + len(data) > self._queue_bytes:
-            self._dropped += 1
+            self.dropped += 1
         else:
             waiting += data
         try:

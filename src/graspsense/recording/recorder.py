@@ -87,7 +87,7 @@ class Recorder(Feed):
             path=self.path,
             **{name: answer[name] for name in WRITTEN},
             deferred=self._deferred,
-            dropped=self._dropped,
+            dropped=self.dropped,
         )
 
     def leave(self) -> None:

@@ -45,7 +45,7 @@ from graspsense_pr2_gripper.protocol import (
     limit,
     micro,
 )
-from graspsense_pr2_gripper.status import REPORTS_LOST, status_bits
+from graspsense_pr2_gripper.status import COMMANDS_LOST, REPORTS_LOST, status_bits
 
 _RATE_HZ: Final = 1000.0
 _PADS_RATE_HZ: Final = 24.39
@@ -64,6 +64,8 @@ OPENING_N: Final = -20.0
 TARE_IMAGES: Final = 6
 UNHEARD_S: Final = 0.1
 """Device time without the echo of a command after which the device counts as lost."""
+COMMANDS_LOST_S: Final = 0.02
+"""Likewise, after which a person is told."""
 UNHEARD_COMMANDS: Final = 5
 """Commands that must be without an echo by then: a host that stops for a moment has sent only one or two."""
 UNCALIBRATED: Final = "none"
@@ -115,16 +117,16 @@ class Pr2Backend(BackendWithEmulator[Pr2Config]):
             return None
         report = arrival.report
         behind = (self._sent - report.echo) & 0xFFFF
-        if behind and self._sent:
-            if report.echo != self._echo:
-                self._heard_us = report.time_us
-            elif behind >= UNHEARD_COMMANDS and report.time_us - self._heard_us > UNHEARD_S * 1e6:
-                raise DeviceLost(
-                    f"the PR2 gripper reports but takes no commands: {behind} were not echoed in {UNHEARD_S} s; its "
-                    "watchdog lets go. Unplug it and plug it in again"
-                )
-        else:
+        if report.echo != self._echo or not (behind and self._sent):
             self._heard_us = report.time_us
+        unheard_s = (report.time_us - self._heard_us) * 1e-6
+        if behind >= UNHEARD_COMMANDS and unheard_s > UNHEARD_S:
+            raise DeviceLost(
+                f"the PR2 gripper reports but takes no commands: {behind} were not echoed in {UNHEARD_S} s; its "
+                "watchdog lets go. Unplug it and plug it in again"
+            )
+        if behind >= UNHEARD_COMMANDS and unheard_s > COMMANDS_LOST_S:
+            report = report._replace(status=report.status | COMMANDS_LOST)
         self._echo = report.echo
         lost, self._lost = self._lost, link.stream.counts.lost
         if self._lost > lost:

@@ -25,8 +25,8 @@ BEYOND_TABLE: Final = 1 << 17
 """A pad force is above its load table."""
 COMMAND_CLAMPED: Final = 1 << 18
 """The board applied its last command at a limit of its own."""
-COMMAND_REFUSED: Final = 1 << 19
-"""The board did not apply the last command that reached it."""
+COMMANDS_LOST: Final = 1 << 19
+"""The board did not apply the last command that reached it, or none has reached it for some time."""
 OLD_IMAGE: Final = 1 << 20
 """The board says that its cell image is older than an image can be."""
 LEFT_DEAD: Final = 1 << 21
@@ -52,7 +52,7 @@ GAPS_S: Final = 1.0
 """Sum of the times between reports of which some were lost in between. A tenth of lost reports stays below it in a
 grasp, a quarter does not, and changes what is recognised."""
 
-RESULT_BITS: Final = {CLAMPED: COMMAND_CLAMPED, REFUSED: COMMAND_REFUSED}
+RESULT_BITS: Final = {CLAMPED: COMMAND_CLAMPED, REFUSED: COMMANDS_LOST}
 """The bit of the frame for a command result of a report; the other results have none."""
 
 KNOWN_BITS: Final = LET_GO | LIMITED | ENCODER_FAULT | SAMPLES_MISSED | LEFT_ABSENT | RIGHT_ABSENT
@@ -99,10 +99,10 @@ _COMMON: Final = (
         limit_s=WRONG_EFFORT_S,
     ),
     StatusBit(
-        mask=COMMAND_REFUSED,
-        name="command refused",
-        meaning="a command arrived damaged and the one before still applies; without a good one for 0.1 s the device "
-        "counts as lost",
+        mask=COMMANDS_LOST,
+        name="commands lost",
+        meaning="a command arrived damaged, or none for 0.02 s, and an old one still applied; without a good one for "
+        "0.1 s the device counts as lost: check the cable and the USB hub",
     ),
     StatusBit(
         mask=OLD_IMAGE,

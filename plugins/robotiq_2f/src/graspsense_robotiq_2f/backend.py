@@ -104,7 +104,6 @@ class RobotiqBackend(BackendWithEmulator[RobotiqConfig]):
         self._gap_m = self._target_m = 0.0
         self._elapsed_s = 1.0 / RATE_HZ
         self._pads = NO_PADS
-        self._zero = ((0.0,) * CELLS, (0.0,) * CELLS)
         self._asked = Request(active=True, go=False, position=0, speed=0, force=0)
         self._clock_report: Mapping[str, float | int | str | bool] = {}
 

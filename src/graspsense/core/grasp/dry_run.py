@@ -126,14 +126,11 @@ class _CommandRecorder(WrappedGripper):
 
     def _described(self, command: Command) -> _Tick:
         """Return what `PhaseCommands` says of a command; the guard has limited it."""
-        kind, value, effort_n, speed_m_s = self._limited_to_gripper(command)
+        kind, value, effort_n, speed_m_s = command
+        # An opening may have no limits of its own.
+        effort_n, speed_m_s = min(effort_n, self._limits_n[0]), min(speed_m_s, self._limits_m_s[0])
         if kind in (EFFORT, FORCE):
             return _Tick(kind, value, self._speed_m_s, abs(value) in self._limits_n)
         if kind == VELOCITY:
             return _Tick(kind, effort_n, max(abs(value), self._speed_m_s), abs(value) in self._limits_m_s)
         return _Tick(kind, effort_n, self._speed_m_s, speed_m_s in self._limits_m_s)
-
-    def _limited_to_gripper(self, command: Command) -> Command:
-        """Return the command with no limits above those of the gripper, as for the opening, which has none."""
-        kind, value, effort_n, speed_m_s = command
-        return Command(kind, value, min(effort_n, self._limits_n[0]), min(speed_m_s, self._limits_m_s[0]))

@@ -93,7 +93,6 @@ class Grasp:
 def tick_params(info: DeviceInfo, controller: Controller[Any], run: RunConfig) -> TickParams:
     """Return the parameters of one grasp of this gripper under this controller."""
     real = info.clock == "device"
-    infinite = float("inf")
     return TickParams(
         schedule=Schedule(
             opens=1 if info.opening is not None else 2 * info.has_release,
@@ -106,8 +105,8 @@ def tick_params(info: DeviceInfo, controller: Controller[Any], run: RunConfig) -
         guard=GuardParams(
             effort_limit_n=info.effort_limit_n,
             speed_limit_m_s=info.speed_limit_m_s,
-            first_effort_n=run.first_effort_n if real else infinite,
-            first_speed_m_s=run.first_speed_m_s if real else infinite,
+            first_effort_n=run.first_effort_n if real else inf,
+            first_speed_m_s=run.first_speed_m_s if real else inf,
             contact_force_n=controller.contact_force_n(),
         ),
         law=controller.params(),
@@ -372,7 +371,7 @@ class _Grasp:
         advance = bind(tick, step=step, events_told=events_of(self.step), TickState=maker(TickState))
         params, record = self.params, self.recorder.add
         on_device_clock = self.info.clock == "device"
-        late_s = run.late_periods / self.info.rate_hz if on_device_clock else float("inf")
+        late_s = run.late_periods / self.info.rate_hz if on_device_clock else inf
         timeout_s = frame_timeout_s(run, self.info)
         state, phase, watcher = self.state, self.state.phase, self.state.guard
         images: list[Pads] = []
@@ -413,7 +412,10 @@ class _Grasp:
                 # Also if the gripper is lost at this moment: the frame was measured.
                 if recorded:
                     record(reading, phase, command)
-                self._check_for_faults(reading, protected_phase, command)
+                if self.protection is not None:
+                    self.protection.watch(reading, protected_phase, command)
+                    if state.done:
+                        self.protection.released(frame)
                 if state.events:
                     self._told(frame, phase, state.events)
                 if recorded and self.sinks:
@@ -475,14 +477,6 @@ class _Grasp:
         self.sinks = [other for other in self.sinks if other is not sink]
         self.failed_sinks.append(f"{type(sink).__name__} failed: {named(error)}")
         self._event(t_s, phase, self.failed_sinks[-1])
-
-    def _check_for_faults(self, reading: Reading, phase: int, command: Command) -> None:
-        """Let the protection see a tick whose command the gripper has, if this gripper can hurt something."""
-        if self.protection is None:
-            return
-        self.protection.watch(reading, phase, command)
-        if self.state.done:
-            self.protection.released(reading.frame)
 
     def _tared(self, images: list[Pads], frame: Frame) -> bool:
         """Set the zero of the pads; return whether the fingers may close."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from typing import final
 
 from graspsense.gripper_api import LockStepDevice
@@ -22,6 +23,8 @@ class LockStepHand(LockStepDevice[FrankaHand]):
         super().__init__(FrankaHand(config, seed))
         self._done = 0
         self._refused = ""
+        self._coming: deque[HandState] = deque()
+        """States that have been sent, each at the time of its arrival."""
         try:
             if self._faults.mood == "old":
                 raise HandGone("it speaks another version of the protocol")
@@ -34,26 +37,33 @@ class LockStepHand(LockStepDevice[FrankaHand]):
         self.first = state
 
     def newest(self, timeout_s: float) -> HandState | None:
-        """Return the state one period later. Raises HandGone."""
-        del timeout_s
-        self._now_s += 1.0 / RATE_HZ
-        self._check()
-        self.hand.look(self._now_s)
-        mood = self._faults.mood_at(self._now_s)
-        if mood == "damaged":
-            raise HandGone("a state was damaged")
-        if mood == "silent":
-            return None
-        self._count()
-        return HandState(
-            host_s=self._now_s,
-            width_m=self.hand.width_m,
-            widest_m=self.hand.widest_m,
-            grasped=self.hand.grasped,
-            temperature_c=float(TEMPERATURE_C),
-            done=self._done,
-            refused=self._refused,
-        )
+        """Return the newest state that has come within this time, at least one period. Raises HandGone."""
+        until_s = self._now_s + timeout_s
+        while True:
+            self._now_s += 1.0 / RATE_HZ
+            self._check()
+            self.hand.look(self._now_s)
+            mood = self._faults.mood_at(self._now_s)
+            if mood == "damaged":
+                raise HandGone("a state was damaged")
+            self._count()
+            if mood != "silent":
+                self._coming.append(
+                    HandState(
+                        host_s=self._now_s + (self._faults.late_s if mood == "late" else 0.0),
+                        width_m=self.hand.width_m,
+                        widest_m=self.hand.widest_m,
+                        grasped=self.hand.grasped,
+                        temperature_c=float(TEMPERATURE_C),
+                        done=self._done,
+                        refused=self._refused,
+                    )
+                )
+            newest = None
+            while self._coming and self._coming[0].host_s <= self._now_s:
+                newest = self._coming.popleft()
+            if newest is not None or self._now_s >= until_s:
+                return newest
 
     def send(self, order: Order) -> None:
         """Order it; what it still does is aborted. Raises HandGone."""

@@ -110,7 +110,9 @@ def lasting(seconds: float, present: bool, dt_s: float) -> float:
     """Return for how long (s) a difference has been there; it is forgotten at half the rate at which it is gathered.
 
     A command that the guard switches on and off at a limit of the speed shows a difference in half of the ticks only.
+    A time that goes back or is no number counts as none: the clock has a fault of its own.
     """
+    dt_s = dt_s if dt_s > 0.0 else 0.0
     return seconds + dt_s if present else max(seconds - 0.5 * dt_s, 0.0)
 
 

@@ -27,7 +27,7 @@ CATCH_UP: Final = 1.5
 """Speed of the gap in a frame after a standstill, over that of the next frame, from which on frames have come twice."""
 COARSE: Final = 3
 """Steps of a gap in a row that stood still before each of them."""
-STEPS_M: Final = 0.002
+STEPS_M: Final = 0.0009
 ALIKE: Final = 0.9
 """Step of the gap from which on it is coarse, and share of it that the others have."""
 SURPLUS_SHARE: Final = 0.05
@@ -105,13 +105,13 @@ class Reports:
         return self._slow(frame.dt_s) if closing else None
 
     def _jumped(self, dt_s: float) -> Fault:
-        self._jumped_s += max(dt_s, 0.0)
+        self._jumped_s += abs(dt_s)
         return Fault(
             "clock jumps",
             f"the time of the gripper changed by {dt_s:+.2f} s from a frame to the next: its clock jumped, or this "
             "computer or the connection stood still, so that times and rates are wrong; check the connection and the "
             "load of this computer",
-            ends=self._jumped_s >= ENDS_SHARE * (self._jumped_s + self._closing_s),
+            ends=not self._jumped_s < ENDS_SHARE * (self._jumped_s + self._closing_s),
         )
 
     def _slow(self, dt_s: float) -> Fault | None:

@@ -85,7 +85,7 @@ class GapSpeed:
         step_m, said_m = frame.gap_m - self._gap_m, frame.velocity_m_s * frame.dt_s
         self._gap_m = frame.gap_m
         self._is_measured = self._is_measured or said_m != 0.0
-        if step_m != step_m or said_m != said_m or not self._is_measured:
+        if step_m != step_m or said_m != said_m or frame.dt_s < 0.0 or not self._is_measured:
             return None
         kept = exp(-frame.dt_s / MEMORY_S)
         self._moved_m, self._said_m = kept * self._moved_m + step_m, kept * self._said_m + said_m
