@@ -82,8 +82,5 @@ def known_unit(text: str, quantity: str) -> str:
     >>> known_unit("msec", "time"), known_unit("MM", "gap"), known_unit("mA", "force"), known_unit("MN", "force")
     ('ms', 'mm', '', '')
     """
-    units = TO_SI[quantity]
-    if text in units or text == _MEGANEWTON:
-        return text if text in units else ""
-    words = {unit.lower(): unit for unit in units} | dict(_UNIT_WORDS.get(quantity, {}))
-    return words.get(text.lower(), "")
+    words = {unit.lower(): unit for unit in TO_SI[quantity]} | dict(_UNIT_WORDS.get(quantity, {}))
+    return "" if text == _MEGANEWTON else words.get(text.lower(), "")

@@ -37,17 +37,18 @@ _EVERY: Final = POINT | THOUSANDS | COMMA
 _NOTATIONS: Final = (POINT, THOUSANDS, COMMA)
 
 _MISSING_WORDS: Final = frozenset({
-    "", "na", "n/a", "n.a.", "<na>", "<missing>", "<undefined>", "nat", "null", "\\n", "none", "?", "."
+    "", "na", "n/a", "n.a.", "<na>", "<missing>", "<undefined>", "nat", "null", "\\n", "none", "?", ".", "missing",
+    "nothing", "nil", "(null)", "no data", "n.d.", "k.a.", "undef"
 })  # fmt: skip
 _MISSING: Final = re.compile(
-    r"[-+]?(?:nan(?:\(\w*\))?|1[.,]#(?:q?nan|ind)\d*)|#[^\W\d][^!?]*[!?]|#[\u00a1\u00bf].*|#n/?[adv]|err:\d{3}|\.[a-z]",
+    r"[-+]?(?:nan(?:\(\w*\)|0x[0-9a-f]+)?|1[.,]#(?:q?nan|ind)\d*)|#[^\W\d][^!?]*[!?]|#[\u00a1\u00bf].*|#n/?[adv]|err:\d{3}|\.[a-z]",
     re.IGNORECASE,
 )
 """NaN as the libraries of C write it, the errors of spreadsheets in their languages, such as `#WERT!`, and `.a` of
 Stata."""
 _LONGEST_MISSING: Final = 20
 
-_LOGICAL: Final = {"True": "1", "False": "0"}
+_LOGICAL: Final = {"True": "1", "False": "0", "Wahr": "1", "Falsch": "0", "Vrai": "1", "Faux": "0"}
 
 _PLAIN_SIGNS: Final = {
     **dict.fromkeys(map(ord, "\u02d7\u2010\u2011\u2012\u2013\u2014\u2212\u2796\ufe63\uff0d"), "-"),
@@ -65,10 +66,10 @@ _POWER: Final = re.compile(
 """`x 10^-3` behind a number."""
 
 
-def _form(mark: str, *whole: str) -> re.Pattern[str]:
-    """Return the pattern of numbers with one of these before the mark of decimals; they can be infinite."""
-    digits = rf"(?:{'|'.join(whole)})(?:{mark}[0-9]*)?|{mark}[0-9]+"
-    number = rf"(?:(?:{digits})(?:[ed][-+]?[0-9]+)?|inf(?:inity)?)"
+def _form(mark: str, whole: str, *groups: str) -> re.Pattern[str]:
+    """Return the pattern of numbers with one of these before the mark of decimals; one with groups has no exponent."""
+    digits = rf"(?:{whole}(?:{mark}[0-9]*)?|{mark}[0-9]+)(?:[ed][-+]?[0-9]+)?"
+    number = rf"(?:{digits}|(?:{'|'.join(groups)})(?:{mark}[0-9]*)?|inf(?:inity)?)"
     return re.compile(rf"[-+]? ?{number}|\({number}\)", re.IGNORECASE)  # (0.5), as accountants write -0.5
 
 

@@ -18,11 +18,11 @@ _TIME: Final = re.compile(
     r"(?:(?P<year>[0-9]{4})[-/]?(?P<month>[0-9]{2}|(?<=[-/])[0-9])[-/]?(?P<day>[0-9]{2}|(?<=[-/])[0-9])[T ]"
     r"|(?P<a>[0-9]{1,2})(?P<mark>[./-])(?P<b>[0-9]{1,2})(?P=mark)(?P<c>[0-9]{4}|[0-9]{2}),? |[0-9]+ days?,? )?"
     r"(?P<hour>[0-9]{1,2}):?(?P<minute>[0-9]{2}):?(?P<second>[0-9]{2}(?:[.,][0-9]{1,9}|:[0-9]{3,9})?)"
-    r"(?: ?(?P<half>[AP])\.?M\.?)? ?(?P<zone>Z|[-+][0-9]{2}:?[0-9]{2}|)",
+    r"(?: ?(?P<half>[AP])\.?M\.?)? ?(?P<utc>Z|UTC|GMT|)(?P<zone>[-+][0-9]{2}:?[0-9]{2}|)",
     re.IGNORECASE,
 )
 _MONTHS: Final = ["jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec"]
-_MONTH: Final = re.compile(rf"(?<=\d)[- ]({'|'.join(_MONTHS)})[a-z]*[- ]", re.IGNORECASE)
+_MONTH: Final = re.compile(rf"(?<=\d)[- ](?:({')|('.join(_MONTHS)}))[a-z]*[- ]", re.IGNORECASE)
 _MINUTES: Final = re.compile(r"[0-5]?[0-9]:[0-5][0-9][.,][0-9]{1,9}")
 """Minutes and seconds; without a fraction they can be hours and minutes."""
 _DAY_S: Final = 86_400.0
@@ -56,7 +56,7 @@ def _seconds(cells: Sequence[str], *, month_first: bool) -> Numbers | None:
     """Return the times in seconds since the first one, None if a cell is not a time."""
     times, dated = [], False
     for cell in cells:
-        match = _TIME.fullmatch(_MONTH.sub(lambda name: f".{_MONTHS.index(name[1].lower()) + 1}.", cell))
+        match = _TIME.fullmatch(_MONTH.sub(lambda name: f".{name.lastindex}.", cell))
         if match is None or not (match["year"] or match["c"] or ":" in cell):
             return None
         dated = dated or bool(match["year"] or match["c"])
@@ -84,9 +84,8 @@ def _time(match: re.Match[str], *, month_first: bool) -> datetime:
             raise ValueError(hour)
         hour = hour % 12 + 12 * (match["half"] in "pP")
     seconds = match["second"].replace(":", ".")
-    text = (
-        f"{year}-{int(month):02}-{int(day):02}T{hour:02}:{match['minute']}:{seconds}{match['zone'].upper()}"
-    )
+    zone = match["zone"] or ("Z" if match["utc"] else "")
+    text = f"{year}-{int(month):02}-{int(day):02}T{hour:02}:{match['minute']}:{seconds}{zone}"
     return datetime.fromisoformat(text)
 
 

@@ -149,9 +149,7 @@ def _grasps(path: Path, arrays: Arrays, rules: TableRules) -> Iterator[ColumnTab
 
 def _have_a_time(arrays: Arrays, used: Collection[str]) -> bool:
     """Return whether an array that is used has a number for each place along the first or the last axis of another."""
-    ends = {
-        length for array in arrays.values() if array.ndim == 3 for length in (array.shape[0], array.shape[-1])
-    }
+    ends = {length for array in arrays.values() if array.ndim == 3 for length in array.shape[::2]}
     flat = [
         array for name, array in arrays.items() if name in used and array.ndim in (1, 2) and array.size > 1
     ]
@@ -163,10 +161,7 @@ def _of_arrays(path: Path, arrays: Arrays, rows: int = 0) -> ColumnTable:
     numeric = {
         name: array
         for name, array in arrays.items()
-        if isinstance(array, np.ndarray)
-        and array.dtype.kind in "fiub"
-        and 1 <= array.ndim <= 4
-        and array.size > 1
+        if array.dtype.kind in "fiub" and 1 <= array.ndim <= 4 and array.size > 1
     }
     if set(arrays) == {_ALONE}:
         numeric = {_ALONE: arrays[_ALONE]}
@@ -194,10 +189,7 @@ def _of_arrays(path: Path, arrays: Arrays, rows: int = 0) -> ColumnTable:
     scalars = {
         name: str(array.reshape(-1)[0])
         for name, array in arrays.items()
-        if isinstance(array, np.ndarray | np.generic)
-        and array.size == 1
-        and array.dtype.kind in "fiubU"
-        and name
+        if array.size == 1 and array.dtype.kind in "fiubU" and name
     }
     units = {name: scalars[f"{name}{_UNITS}"] for name in columns if f"{name}{_UNITS}" in scalars}
     return ColumnTable(source=path.name, numbers=columns, shapes=shapes, fields=scalars, units=units)

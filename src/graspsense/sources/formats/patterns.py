@@ -22,6 +22,8 @@ MOST_TRIES: Final = 1000
 """Limit on the values that are tried for a field that a template names twice."""
 
 _TEMPLATE: Final = re.compile(r"\{(?P<name>\w+)(?P<digits>:d)?\}|(?P<deep>\*\*/)|(?P<any>\*)|(?P<single>\?)")
+_WILDCARD: Final = re.compile(r"(\[(?:(!)([^]]*)|([^!][^]]*))\]|.)", re.DOTALL)
+_OF_A_CHOICE: Final = re.compile(r"([\\\]\[^])")
 _UNSUPPORTED: Final = re.compile(r"\\[1-9]|\(\?P=|\(\?<?[=!]|\(\?>|[*+?}]\+")
 
 
@@ -69,20 +71,12 @@ def wildcard(text: str) -> re.Pattern[str]:
     Raises PatternError.
     """
     _check_length(text)
-    parts = []
-    position = 0
-    while position < len(text):
-        sign = text[position]
-        closing = text.find("]", position + 2) if sign == "[" else -1
-        if closing > 0:
-            inside = text[position + 1 : closing]
-            negated = inside.startswith("!")
-            choice = re.sub(r"([\\\]\[^])", r"\\\1", inside[negated:])
-            parts.append(f"[{'^' * negated}{choice}]")
-            position = closing
-        else:
-            parts.append({"*": ".*", "?": "."}.get(sign) or re2.escape(sign))
-        position += 1
+    parts = [
+        "[" + "^" * len(mark) + _OF_A_CHOICE.sub(r"\\\1", others or choice) + "]"
+        if len(sign) > 1
+        else {"*": ".*", "?": "."}.get(sign) or re2.escape(sign)
+        for sign, mark, others, choice in _WILDCARD.findall(text)
+    ]
     return _compiled(f"(?s:{''.join(parts)})")
 
 

@@ -20,7 +20,7 @@ READ_SUFFIXES: Final = (*TEXT_SUFFIXES, *ARRAY_SUFFIXES, *BAG_SUFFIXES, *PARQUET
 def raw_tables(path: Path, rules: TableRules | None = None) -> list[ColumnTable]:
     """Return the tables in a file. Without rules, they are as they come: one for each topic of a bag.
 
-    With rules, a file without an ending is a text. Raises ConfigError, PluginUnavailable, TooLarge, DataDamaged.
+    With rules, a log or a bare name is a text. Raises ConfigError, PluginUnavailable, TooLarge, DataDamaged.
     """
     suffix, given = path.suffix.lower(), rules or TableRules()
     if path.is_dir() or suffix in BAG_SUFFIXES:
@@ -33,7 +33,7 @@ def raw_tables(path: Path, rules: TableRules | None = None) -> list[ColumnTable]
         return read_parquet(path)
     if suffix in ARRAY_SUFFIXES:
         return read_arrays(path, given)
-    if text_suffix(path) in TEXT_SUFFIXES or (rules is not None and not text_suffix(path)):
+    if text_suffix(path) in TEXT_SUFFIXES or (rules is not None and text_suffix(path) in ("", ".log")):
         from graspsense.sources.formats.text_format import read_text
 
         return read_text(path, given.start)

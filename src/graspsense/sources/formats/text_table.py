@@ -13,10 +13,10 @@ import re
 import unicodedata
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
-from itertools import chain, takewhile
+from itertools import chain, compress, pairwise, takewhile
 from operator import itemgetter, lt
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from attrs import frozen
 
@@ -29,6 +29,7 @@ from graspsense.core.values.written_numbers import (
     is_number,
     plain_text,
 )
+from graspsense.core.values.written_times import seconds_since_first
 from graspsense.recording.readable import readable, refuse_devices
 from graspsense.recording.unpacked import Unpacked
 from graspsense.sources.formats.spreadsheet import spreadsheet_text
@@ -43,17 +44,22 @@ INDEX: Final = "index"
 """Name of a first column without a name."""
 _SINGLE_UNITS: Final = frozenset("smgNJWVACK%\u00b0")
 """Units of one sign behind a number: in the other case, or as `12-`, it can be a factor or a sign of its own."""
-_UNSEEN: Final = re.compile("[\u200b\u200e\u200f\u202a-\u202e\u2060\u2066-\u2069\ufeff]")
-"""Marks that nothing shows: the order of bytes, also in the middle of files that were joined, and of writing."""
-_SEPARATORS: Final = (";", "\t", ",", "|", " ", "  ")
-"""The last ones stand for any number of spaces, and for two or more, where names have spaces."""
+_UNSEEN: Final = re.compile(
+    "\u00ef\u00bb\u00bf|[\u061c\u200b\u200e\u200f\u202a-\u202e\u2060\u2066-\u2069\ufeff]"
+)
+"""Marks that nothing shows: of writing, and the order of bytes, also in joined files, or taken for three letters."""
+_SPACES: Final = ("  ", " ")
+"""Two spaces or more, where names have spaces, and any number of them."""
+_SEPARATORS: Final = (";", "\t", ",", "|", *_SPACES)
 _COMMENTS: Final = ("#", "%", "//", "!")
-_RULE: Final = re.compile(r"(?=.*[-_=]{3})[-_=+|:\s]+")
+_RULE: Final = re.compile(r"(?=.*(?:[-_=]{3}|:-|-:))[-_=+|:\s]+")
 """A line of signs below the names, or around a table."""
 _REMARKS: Final = frozenset({"comment", "comments", "remark", "remarks", "note", "notes"})
 """Names of a last column that can be without any cell."""
-_KINDS: Final = frozenset(("continuous", "c", "discrete", "d", "string", "s", "time", "t"))
-"""What Orange calls the kinds of columns, in a line below their names."""
+_KIND: Final = re.compile(
+    "<?(?:continuous|c|discrete|d|string|s|time|t|u?int(?:eger)?|float|double|real|num(?:ber|eric)?|dbl)(?:8|16|32|64)?>?"
+)
+"""The kind of a column in a line below the names, as Orange and other programs write it, in small letters."""
 _SEPARATOR_LINE: Final = re.compile(r'"?sep=([;,\t|])"?\s*')
 _SPREADSHEETS: Final = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
 """The first bytes of a ZIP file, as which spreadsheets are saved, and of those of old programs."""
@@ -98,6 +104,15 @@ class TextTable:
     named_in: int = 0
     """The line with the names, 0 if there is none."""
     separator: str = ""
+
+
+class _Header(NamedTuple):
+    """The names of the columns in a line (0: none), cells of units if there are any, and the first row behind both."""
+
+    names: list[str]
+    units: list[str] | None
+    begin: int
+    line: int
 
 
 def read_lines(path: Path, start: str = "") -> tuple[list[Line], bool]:
@@ -148,7 +163,7 @@ class _Layout:
             plain = [(number, line.strip()[1:-1]) for number, line in plain]
         self.separator = given[1] if given else _separator([line for _, line in _sample(plain)])
         self.blank: list[int] = []
-        self.rows = _with_remarks(list(self._checked(self._rows(plain))))
+        self.rows = _with_remarks(self._checked(self._rows(plain)))
 
     def table(self, ended: bool) -> TextTable:
         """Return the table. Raises DataDamaged."""
@@ -156,22 +171,20 @@ class _Layout:
             return TextTable(names=(), units=(), columns=(), lines=())
         names, units, begin, line = self._header()
         check_columns(self.path, names)
-        rows = self.rows[begin:]
-        rows = self._without_repeats(rows, names, units)
+        rows = self._without_repeats(self.rows[begin:], names, units)
         rows = self._without_texts(rows, len(names))
-        if _begin_with_names_of_rows(rows, len(names) + 1):
+        rows = [(number, row if any(row[len(names) :]) else row[: len(names)]) for number, row in rows]
+        if names[0] and _begin_with_names(rows, len(names) + 1):
             names, units = ["", *names], ["", *units] if units else None
-        names, rows = self._without_blank_end(names, rows)
         rows = self._without_cut(rows, len(names), ended)
         for number, row in rows:
             if len(row) != len(names):
                 raise DataDamaged(
                     f"{self.path}, line {number}: {len(row)} values, but there are {len(names)} columns"
                 )
-        if later := [number for number, _ in self.comments if rows and number > rows[0][0]]:
-            self._tell(later, "comment")
-        if between := [number for number in self.blank if rows and rows[0][0] < number < rows[-1][0]]:
-            self._tell(between, "line of empty cells")
+        self._tell((number for number, _ in self.comments if rows and number > rows[0][0]), "comment")
+        between = (number for number in self.blank if rows and rows[0][0] < number < rows[-1][0])
+        self._tell(between, "line of empty cells")
         return TextTable(
             names=tuple(" ".join(name.split()) for name in names),  # in quotes, one can have several lines
             units=tuple(unit.strip("[]()") for unit in (units or [""] * len(names))[: len(names)]),
@@ -184,11 +197,13 @@ class _Layout:
 
     def _rows(self, lines: Sequence[Line]) -> Iterator[Row]:
         """Yield the cells of each line; a cell in quotes may go over several lines. Raises DataDamaged."""
-        if self.separator in (" ", "  "):
+        if self.separator in _SPACES:
             for number, line in lines:
-                yield number, _words(line, self.separator)
+                yield number, _split(line, self.separator)
             return
-        reader = csv.reader((line + "\n" for _, line in lines), delimiter=self.separator, strict=True)
+        reader = csv.reader(
+            (line + "\n" for _, line in lines), delimiter=self.separator, skipinitialspace=True, strict=True
+        )
         try:
             for row in reader:
                 cells = list(map(str.strip, row))
@@ -199,9 +214,12 @@ class _Layout:
             number = lines[max(0, min(reader.line_num, len(lines)) - 1)][0]
             raise DataDamaged(f"{self.path}, line {number}: {error}") from None
 
-    def _checked(self, rows: Iterator[Row]) -> Iterator[Row]:
-        """Yield the rows that are not empty, and keep the numbers of the others. Raises DataDamaged for too many."""
-        cells, most, widest = 0, CELLS.most, COLUMNS.most
+    def _checked(self, rows: Iterator[Row]) -> list[Row]:
+        """Return the rows that are not empty, without the last columns that none has, and keep the others' numbers.
+
+        Separators at the end of lines make such columns. Raises DataDamaged for too many cells.
+        """
+        kept, cells, most, widest = [], 0, CELLS.most, COLUMNS.most
         for number, row in rows:
             if not any(row):
                 self.blank.append(number)
@@ -210,41 +228,44 @@ class _Layout:
             if len(row) > widest or cells > most:
                 too_many = COLUMNS.exceeded(len(row)) or CELLS.exceeded(cells)
                 raise DataDamaged(f"{self.path}, line {number}: {too_many}")
-            yield number, row
+            kept.append((number, row))
+        used = max((len(row) for _, row in kept), default=0)
+        while used and not any(any(row[used - 1 :]) for _, row in kept):
+            used -= 1
+        return [(number, row[:used]) for number, row in kept]
 
-    def _header(self) -> tuple[list[str], list[str] | None, int, int]:
-        """Return the names, the units if a line has them, the first row behind both, and the line of the names."""
+    def _header(self) -> _Header:
+        """Return where the names are. Raises DataDamaged if none of several lines before the numbers has them."""
         sample = _sample([row for _, row in self.rows])
         width = max(Counter(map(len, sample)).items(), key=lambda item: (item[1], item[0]))[0]
-        if len(self.rows[0][1]) == 1 < width:
-            divided = self._cells(self.rows[0][1][0], width)
-            self.rows[0] = (self.rows[0][0], divided if len(divided) == width else self.rows[0][1])
-        sample = sample[: max(2, _SAMPLED_SIZE // width)]
-        numeric = _numeric_columns(sample, width)
+        line, top = self.rows[0]
+        if len(top) == 1 < width and len(divided := self._cells(top[0], width)) == width:
+            top = divided
+            self.rows[0] = (line, top)
+        numeric = _numeric_columns(sample[: max(2, _SAMPLED_SIZE // width)], width)
         data = next((k for k, (_, row) in enumerate(self.rows) if _is_data(row, width, numeric)), None)
         data = self._without_kinds(data, numeric)
-        top = self.rows[0][1]
         if data is not None and (names := self._second_names(data, width, numeric)):
-            return self._later_header(names + 1, width, numeric)
-        if data is None or (data == 1 and len(top) > 1):
-            return top, None, 1, self.rows[0][0]
-        if data == 0:
-            named = self._names_in_comment(width)
-            if named is not None:
-                return named[1], named[2], 0, named[0]
-            if _are_numbers(top):
-                ordinals = [*map(str, range(width))]
-                if numbered := width > 2 and top in (ordinals, ["", *ordinals[:-1]]):
-                    self._tell([self.rows[0][0]], "line with numbers of the columns")
-                return [f"c{k}" for k in range(1, width + 1)], None, int(numbered), 0
-            return top, None, 1, self.rows[0][0]
-        return self._later_header(data, width, numeric)
+            return self._header_before(names + 1, width, numeric)
+        if data is None or (data == 1 and len(top) > max(1, width - 2) and not _are_numbers(top)):
+            return _Header(top, None, 1, line)
+        named = data == 0 and not (_are_numbers(top) or self._is_as_below(top, numeric))
+        if named and not self._names_in_comment(width, 0):
+            return _Header(top, None, 1, line)
+        return self._header_before(data, width, numeric)
+
+    def _is_as_below(self, top: Sequence[str], numeric: frozenset[int]) -> bool:
+        """Return whether a cell of the first row is no name: a text that its column has below, or a time."""
+        texts = {(k, cell) for _, row in self.rows[1:] if row != top for k, cell in enumerate(row)}
+        cells = [(k, cell) for k, cell in enumerate(top) if k not in numeric and cell]
+        return any(item in texts or seconds_since_first([item[1]]) is not None for item in cells)
 
     def _without_kinds(self, data: int | None, numeric: frozenset[int]) -> int | None:
-        """Return the first row of numbers, after leaving out those in which Orange says what the columns are."""
+        """Return the first row of numbers, after leaving out those that say of which kinds the columns are."""
         for k in range(1, data or 0):
-            kinds = {cell for c, cell in enumerate(self.rows[k][1]) if c in numeric}
-            if kinds <= _KINDS and ("continuous" in kinds or ("c" in kinds and self.rows[k + 1 : data])):
+            kinds = {cell.lower() for c, cell in enumerate(self.rows[k][1]) if c in numeric} - {""}
+            named = any(len(kind) > 1 for kind in kinds) or ("c" in kinds and self.rows[k + 1 : data])
+            if named and all(map(_KIND.fullmatch, kinds)):
                 self._tell([number for number, _ in self.rows[k:data]], "line on the kinds of columns")
                 del self.rows[k:data]
                 return k
@@ -255,20 +276,17 @@ class _Layout:
         most = data + max(_FEW_BEFORE, int(_MOST_BEFORE * len(self.rows)))
         named = [
             k
-            for k, (_, row) in enumerate(self.rows[data + 1 : most + 1], data + 1)
+            for k, ((_, row), (_, following)) in enumerate(pairwise(self.rows[data + 1 : most + 2]), data + 1)
             if len(row) > 1
             and not any(is_number(row[c]) or is_missing(row[c]) for c in numeric if c < len(row))
             and _can_be_names(row, width, [set()] * width)
             and all(row != earlier for _, earlier in self.rows[:data])
-            and k + 1 < len(self.rows)
-            and _is_data(self.rows[k + 1][1], width, numeric)
+            and _is_data(following, width, numeric)
         ]
         return named[-1] if named else None
 
-    def _later_header(
-        self, data: int, width: int, numeric: frozenset[int]
-    ) -> tuple[list[str], list[str] | None, int, int]:
-        """Return the same where `data` rows come before the numbers. Raises DataDamaged if none of them has names."""
+    def _header_before(self, data: int, width: int, numeric: frozenset[int]) -> _Header:
+        """Return where the names are if `data` rows come before the numbers. Raises DataDamaged if none has names."""
         if joined := self._joined_names(data, width):
             return joined
         head = [row for _, row in self.rows[:data]]
@@ -276,38 +294,52 @@ class _Layout:
         texts = [set() if k in numeric else {row[k] for row in below if k < len(row)} for k in range(width)]
         able = [k for k in range(data) if _can_be_names(self.rows[k][1], width, texts)]
         if not able:
-            number, row = self.rows[data]
-            if all(len(row) == 1 for _, row in self.rows[:data]):
-                self.notes.append(
-                    f"{data} lines before the numbers are left out, and none of them names the columns"
-                )
-                return [f"c{k}" for k in range(1, width + 1)], None, data, 0
-            raise DataDamaged(
-                f"{self.path}: the numbers begin in line {number} with {len(row)} values, and no line before it names "
-                f"{width} columns. If line {self.rows[data - 1][0]} is to be left out and the names stand in the next "
-                'line, say so in a manifest: start = "a text in that line"'
-            )
+            return self._names_in_comment(width, data) or self._without_names(data, width)
         # Units come behind the names, and remarks on the columns may come behind the units.
         with_units = [
             k
             for k in able
             if k + 1 < data
+            and len(self.rows[k][1]) <= len(self.rows[k + 1][1])
             and _are_units(self.rows[k + 1][1])
             and not _are_units(self.rows[k][1])
             and {*range(k + 2, data)} <= {*able}
         ]
         names = (with_units or able)[-1]
-        units = self.rows[names + 1][1] if with_units else None
-        if names:
+        above = self.rows[names - 1][1] if names and not with_units else []
+        units = (
+            self.rows[names + 1][1]
+            if with_units
+            else above
+            if len(above) == width and _are_units(above)
+            else None
+        )
+        if skipped := [number for number, row in self.rows[:names] if row is not units]:
             self._refuse_numbers_before(names)
-            skipped = [number for number, _ in self.rows[:names]]
-            self.notes.append(
-                f"the names of the columns are those of line {self.rows[names][0]}; "
-                + _lines_words(skipped, "line before them")
-            )
-        return self.rows[names][1], units, data if units else names + 1, self.rows[names][0]
+            self.notes.append(f"the names of the columns are those of line {self.rows[names][0]}")
+            self._tell(skipped, "line before them")
+        return _Header(self.rows[names][1], units, data if with_units else names + 1, self.rows[names][0])
 
-    def _joined_names(self, data: int, width: int) -> tuple[list[str], list[str] | None, int, int] | None:
+    def _without_names(self, data: int, width: int) -> _Header:
+        """Return names for numbers without any. Raises DataDamaged if lines before them may have names."""
+        line, top = self.rows[data]
+        ordinals = [*map(str, range(width))]
+        if data == 0 and width > 2 and top in (ordinals, ["", *ordinals[:-1]]):
+            self._tell([line], "line with numbers of the columns")
+            data = 1
+        elif (data == 1 and _are_numbers(self.rows[0][1])) or all(
+            len(row) == 1 for _, row in self.rows[:data]
+        ):
+            self._tell([number for number, _ in self.rows[:data]], "line before the numbers without names")
+        else:
+            raise DataDamaged(
+                f"{self.path}: the numbers begin in line {line} with {len(top)} values, and no line before it names "
+                f"{width} columns. If line {self.rows[data - 1][0]} is to be left out and the names stand in the next "
+                'line, say so in a manifest: start = "a text in that line"'
+            )
+        return _Header([f"c{k}" for k in range(1, width + 1)], None, data, 0)
+
+    def _joined_names(self, data: int, width: int) -> _Header | None:
         """Return the names that several lines before the numbers have together, None if the last of them has all.
 
         pandas writes each level of its names in a line, and a spreadsheet a merged cell once, with blanks behind it.
@@ -323,14 +355,11 @@ class _Layout:
             return None
         *upper, lowest = levels
         given = [cell for cell in lowest if cell]
-        if len(set(given)) < len(given):
-            for row in upper:
-                for k in range(1, width):
-                    row[k] = row[k] or (row[k - 1] if lowest[k] else "")
-        else:
-            upper = [
-                ["" if below else cell for cell, below in zip(row, lowest, strict=True)] for row in upper
-            ]
+        repeats = len(set(given)) < len(given)
+        for row in upper:
+            for k, below in enumerate(lowest):
+                if below:
+                    row[k] = (row[k] or row[max(k - 1, 0)]) if repeats else ""
         names = ["_".join(filter(None, parts)) for parts in zip(*upper, lowest, strict=True)]
         if names == lowest or not _names_all(names):
             return None
@@ -338,7 +367,7 @@ class _Layout:
         self.notes.append(
             f"the names of the columns are those of the lines {listed([*map(str, lines)])}, joined by _"
         )
-        return names, units, data, lines[-1]
+        return _Header(names, units, data, lines[-1])
 
     def _refuse_numbers_before(self, names: int) -> None:
         """Raise DataDamaged if rows of numbers that may be a part of the data come before the row `names`."""
@@ -350,37 +379,39 @@ class _Layout:
                 'or say in a manifest which line begins each grasp: start = "a text in that line"'
             )
 
-    def _names_in_comment(self, width: int) -> tuple[int, list[str], list[str] | None] | None:
-        """Return the line, the names and the units that comments before the first row have; None if none has names.
+    def _names_in_comment(self, width: int, data: int) -> _Header | None:
+        """Return the names and the units that comments before this row have; None if none has names.
 
         Units stand in the last comment.
         """
-        above = [
-            (number, self._cells(line, width)) for number, line in self.comments if number < self.rows[0][0]
-        ]
+        begin = self.rows[data][0]
+        above = [(number, self._cells(line, width)) for number, line in self.comments if number < begin]
         units = None
         if len(above) > 1 and len(above[-1][1]) == width and _are_units(above[-1][1]):
             units = above.pop()[1]
         # As many words as columns can be a remark.
         for number, cells in above[-1:] if self.separator == " " else reversed(above):
-            if len(cells) == width == len(set(cells)) and all(cells) and not any(map(is_number, cells)):
-                return number, cells, units
+            if len(cells) == width and _names_all(cells) and not any(map(is_number, cells)):
+                self._tell([line for line, _ in self.rows[:data]], "line before the numbers")
+                return _Header(cells, units, data, number)
         return None
 
     def _cells(self, comment: str, width: int) -> list[str]:
         """Return the names in a text, which may separate so many words by another sign than the rows do."""
         text = comment.strip().lstrip("#%/! ")
-        for separator in _SEPARATORS[:-2]:
-            cells = [cell.strip() for cell in text.split(separator)]
-            if len(cells) == width and (
-                separator == self.separator or not any(" " in cell for cell in cells)
-            ):
+        for separator in _SEPARATORS if self.separator in _SPACES else _SEPARATORS[: -len(_SPACES)]:
+            cells = _split(text, separator)
+            whole = separator == self.separator or not any(" " in cell for cell in cells)
+            if whole and len(cells) == width:
                 return cells
-        return _words(text, " ") if self.separator == " " else text.split(self.separator)
+        return _split(text, self.separator)
 
     def _tell(self, numbers: Iterable[int], what: str) -> None:
-        """Note that these lines are left out."""
-        self.notes.append(_lines_words(sorted(numbers), what))
+        """Note that these lines are left out, if there are any."""
+        lines = sorted(numbers)
+        some = ", ".join(map(str, lines[:4])) + (", ..." if len(lines) > 4 else "")
+        several = what.replace("line ", "lines ", 1) if what.startswith("line ") else f"{what}s"
+        self.notes += [f"left out: {counted(len(lines), what, several)} (line {some})"] if lines else []
 
     def _without_repeats(
         self, rows: list[Row], names: Sequence[str], units: Sequence[str] | None
@@ -406,13 +437,6 @@ class _Layout:
         self._tell(texts, "line of text")
         return [row for row in rows if row[0] not in texts]
 
-    def _without_blank_end(self, names: list[str], rows: list[Row]) -> tuple[list[str], list[Row]]:
-        """Return names and rows without the last columns that separators at the end of lines make."""
-        n = len(names)
-        while n > 1 and not names[n - 1] and not any(any(row[n - 1 :]) for _, row in rows):
-            n -= 1
-        return names[:n], [(number, row if any(row[n:]) else row[:n]) for number, row in rows]
-
     def _without_cut(self, rows: list[Row], width: int, ended: bool) -> list[Row]:
         """Return the rows without a last one that was cut off while it was written."""
         if ended or len(rows) < 4:
@@ -430,13 +454,16 @@ class _Layout:
 
 def _comments_and_others(lines: Sequence[Line]) -> tuple[list[Line], list[Line]]:
     """Return the comments, and the other lines without rules. Behind names, trials can be called #1, #2, and so on."""
-    marked = [line.lstrip().startswith(_COMMENTS) for _, line in lines]
+    marked = [
+        line.lstrip().startswith(_COMMENTS)
+        and not is_missing(re.split("[;,\t| ]", line.lstrip(), maxsplit=1)[0])
+        for _, line in lines
+    ]
     begin = marked.index(False) if False in marked else len(lines)
     if 2 * sum(marked[begin:]) > len(lines) - begin:
         marked[begin:] = [False] * (len(lines) - begin)
-    comments = [line for line, is_comment in zip(lines, marked, strict=True) if is_comment]
     others = [line for line, is_comment in zip(lines, marked, strict=True) if not is_comment]
-    return comments, [line for line in others if not _RULE.fullmatch(line[1])]
+    return list(compress(lines, marked)), [line for line in others if not _RULE.fullmatch(line[1])]
 
 
 def _with_remarks(rows: list[Row]) -> list[Row]:
@@ -453,18 +480,18 @@ def _with_remarks(rows: list[Row]) -> list[Row]:
     return [(number, [*row, ""] if len(row) == width - 1 else row) for number, row in rows]
 
 
-def _begin_with_names_of_rows(rows: Sequence[Row], width: int) -> bool:
-    """Return whether all rows have so many cells, and number or name themselves in the first, which R does not name.
+def _begin_with_names(rows: Sequence[Row], width: int) -> bool:
+    """Return whether all rows have so many cells, and number or name themselves in the first, as those of R do.
 
     Numbers that R has sorted are in another order; from the last to the first, they can be measured.
     """
     names, n = [row[0] for _, row in rows if len(row) == width], len(rows)
+    if len(set(names)) < max(n, 2):
+        return False
     if not any(map(is_number, names)):
-        return len(set(names)) == n > _FEW_BEFORE
-    return n > 1 and any(
-        sorted(counter) == sorted(names) and counter[::-1] != names
-        for counter in ([*map(str, range(n))], [*map(str, range(1, n + 1))])
-    )
+        return n > _FEW_BEFORE
+    counted = {*names} in ({*map(str, range(n))}, {*map(str, range(1, n + 1))})
+    return counted and names != sorted(names, key=int, reverse=True)
 
 
 def numbers_with_unit(cells: Sequence[str], of_column: str = "") -> tuple[Sequence[str], str]:
@@ -502,10 +529,13 @@ def _json_table(path: Path, lines: Sequence[Line], ended: bool) -> TextTable:
     notes: list[str] = []
     for k, (number, line) in enumerate(written):
         try:
-            value = json.loads(line, parse_float=str, parse_int=str)
-            if not isinstance(value, dict):
+            value = json.loads(line, parse_float=str, parse_int=str, object_pairs_hook=tuple)
+            if not isinstance(value, tuple):
                 raise DataDamaged(f"{path}, line {number}: not a JSON object in braces")
-            row = dict(_cells_of(value, "", 0))
+            cells = list(_cells_of(value, "", 0))
+            row = dict(cells)
+            if len(row) < len(cells):
+                raise ValueError("it names a value twice")
         except (ValueError, RecursionError) as error:
             if k and k == len(written) - 1 and not ended:
                 notes.append(f"line {number} is cut off, and left out")
@@ -527,14 +557,14 @@ def _json_table(path: Path, lines: Sequence[Line], ended: bool) -> TextTable:
 
 
 def _cells_of(value: Any, name: str, depth: int) -> Iterator[tuple[str, str]]:
-    """Yield the name and the text of each value in a JSON value: `pads.left`, `taxels.0`."""
+    """Yield the name and the text of each value in a JSON value: `pads.left`, `taxels.0`. An object is its pairs."""
     if depth > _MOST_JSON_PARTS:
         raise ValueError(f"it is nested deeper than {_MOST_JSON_PARTS}")
     if isinstance(value, list):
-        value = {str(k): part for k, part in enumerate(value)}
-    if isinstance(value, dict):
-        for key, part in value.items():
-            yield from _cells_of(part, f"{name}.{key}" if name else key, depth + 1)
+        value = tuple(enumerate(value))
+    if isinstance(value, tuple):
+        for key, part in value:
+            yield from _cells_of(part, f"{name}.{key}" if name else str(key), depth + 1)
     else:
         text = str(int(value)) if isinstance(value, bool) else str(value).strip()
         yield name, "" if value is None else text
@@ -549,26 +579,31 @@ def _sample(lines: Sequence[Any]) -> list[Any]:
 def _separator(lines: Sequence[str]) -> str:
     """Return what separates the cells of these lines: a semicolon, a tab, a comma, a bar, or any number of spaces.
 
-    It gives most lines the same number of cells, and the first line as many if any does. In a single column it is a
-    sign that no text has: the name may have spaces.
+    It gives most lines, and so their names, the same number of cells. In a single column it is a sign that no text has:
+    the name may have spaces.
     """
     widths = {separator: _width(lines, separator) for separator in _SEPARATORS}
     agreeing = {separator: count for separator, (width, count) in widths.items() if width > 1}
-    spaces_agree = agreeing.get(" ", 0) >= agreeing.get(",", 1)
-    if spaces_agree and 2 * sum(map(_are_numbers, map(str.split, lines))) >= len(lines):
+    signs = {separator: count for separator, count in agreeing.items() if separator.strip(" ")}
+    between = (2 * sum(map(is_number, words)) > len(words) for words in (_split(line, " ") for line in lines))
+    tabs = ("\t" in line and _are_numbers(line.split("\t")) for line in lines)
+    if signs and (2 * sum(between) < len(lines) or 2 * sum(tabs) >= len(lines)):
+        agreeing = signs
+    elif agreeing.get(" ", 0) >= agreeing.get(",", 1):
         agreeing.pop(",", None)  # it is within numbers, as in `1,5 2,5`
-    able = [separator for separator, count in agreeing.items() if count >= 0.9 * max(agreeing.values())]
-    fitting = [item for item in able if _width(lines[:1], item)[0] == widths[item][0]]
-    return next(iter(fitting or able), "\x1f")
+    return max(agreeing, key=lambda separator: agreeing[separator], default="\x1f")
 
 
-def _words(line: str, separator: str) -> list[str]:
-    """Return the words between one or two spaces at least; spaces within quotes are of their word."""
+def _split(line: str, separator: str) -> list[str]:
+    """Return the cells of a line; none if it cannot be divided. Spaces within quotes are of their word."""
     if separator == "  ":
-        return re.split(r"\s{2,}", line.strip())
-    if '"' not in line:
-        return line.split()
-    return [quoted or word for quoted, word in re.findall(r'"([^"]*)"(?!\S)|(\S+)', line)]
+        return [word.strip('"') for word in re.split(r"\s{2,}", line.strip())]
+    if separator == " ":
+        return [quoted or word for quoted, word in re.findall(r'"([^"]*)"(?!\S)|(\S+)', line)]
+    try:
+        return [*map(str.strip, next(csv.reader([line], delimiter=separator, skipinitialspace=True), []))]
+    except (csv.Error, ValueError):
+        return []
 
 
 def _are_numbers(cells: Sequence[str]) -> bool:
@@ -577,46 +612,33 @@ def _are_numbers(cells: Sequence[str]) -> bool:
 
 
 def _width(lines: Sequence[str], separator: str) -> tuple[int, int]:
-    """Return the most frequent number of cells of a line, and how many lines have it."""
-    widths: Counter[int] = Counter()
-    for line in lines:
-        try:
-            spaces = separator in (" ", "  ")
-            cells = _words(line, separator) if spaces else next(csv.reader([line], delimiter=separator), [])
-        except (csv.Error, ValueError):
-            continue
-        widths[len(cells)] += 1
-    return max(widths.items(), key=lambda item: item[1], default=(1, 0))
+    """Return the most frequent number of cells of a line, without separators at its end, and how many lines have it."""
+    short = [line.rstrip(separator) for line in lines]
+    widths = Counter(
+        len(_split(text if separator in text else line, separator))
+        for text, line in zip(short, lines, strict=True)
+    )
+    return max(widths.items(), key=itemgetter(1), default=(1, 0))
 
 
 def _numeric_columns(rows: Sequence[Sequence[str]], width: int) -> frozenset[int]:
     """Return which columns have numbers in most rows of this width."""
-    numbers, known = Counter[int](), Counter[int]()
-    for row in rows:
-        if len(row) == width:
-            for k, cell in enumerate(row):
-                if not is_missing(cell):
-                    known[k] += 1
-                    numbers[k] += is_number(cell)
-    return frozenset(k for k in range(width) if numbers[k] * 2 >= known[k] > 0)
+    columns = zip(*(row for row in rows if len(row) == width), strict=True)
+    known = {k: [cell for cell in cells if not is_missing(cell)] for k, cells in enumerate(columns)}
+    return frozenset(k for k, cells in known.items() if 2 * sum(map(is_number, cells)) >= len(cells) > 0)
 
 
 def _is_data(row: Sequence[str], width: int, numeric: frozenset[int]) -> bool:
     """Return whether a row has a number where numbers are expected, and nothing else there."""
-    if len(row) != width:
-        return False
-    there = [row[k] for k in numeric if not is_missing(row[k])]
-    return bool(there) and all(map(is_number, there))
+    there = [row[k] for k in numeric if k < len(row) and not is_missing(row[k])]
+    return len(row) == width and bool(there) and all(map(is_number, there))
 
 
 def _rise(cells: Sequence[str]) -> bool:
     """Return whether numbers rise from row to row, as times and the numbers of rows do, and labels and features not."""
     numbers = columns_of_numbers({"": cells})[""]
-    return (
-        len(cells) > _FEW_BEFORE
-        and not isinstance(numbers, NotNumbers)
-        and all(map(lt, numbers, numbers[1:]))
-    )
+    rise = not isinstance(numbers, NotNumbers) and all(map(lt, numbers, numbers[1:]))
+    return len(cells) > _FEW_BEFORE and rise
 
 
 def _is_text_behind(row: Sequence[str], width: int, numeric: frozenset[int], *, rises: bool) -> bool:
@@ -628,14 +650,13 @@ def _is_text_behind(row: Sequence[str], width: int, numeric: frozenset[int], *, 
 
 def _can_be_names(row: Sequence[str], width: int, texts: Sequence[set[str]]) -> bool:
     """Return whether a row can name so many columns: different texts, and none that a column of text has below."""
-    cells = row[:-1] if len(row) == width + 1 and not row[-1] else row
-    named = [cell for cell in cells if cell]
+    named = [cell for cell in row if cell]
     return (
-        width - 1 <= len(cells) <= width
-        and len(named) >= max(len(cells) - 1, 1)
+        width - 1 <= len(row) <= width
+        and len(named) >= max(len(row) - 1, 1)
         and not any(is_number(cell) or (is_missing(cell) and plain_text(cell).strip("-.?")) for cell in named)
-        and (2 * len(set(named)) > len(named) or _are_units(cells))
-        and not any(cell in texts[k] for k, cell in enumerate(cells) if cell)
+        and (2 * len(set(named)) > len(named) or _are_units(row))
+        and not any(cell in texts[k] for k, cell in enumerate(row) if cell)
     )
 
 
@@ -661,21 +682,14 @@ def _decimals(cell: str) -> int:
 def distinct_names(names: Sequence[str]) -> list[str]:
     """Return a name for each column: a second one of the same name gets `.1` behind it, as pandas writes it."""
     ordered: dict[str, None] = {}
-    repeats: dict[str, int] = {}
+    again = Counter[str]()
     for k, given in enumerate(names):
-        name = given or (INDEX if k == 0 else f"c{k + 1}")
-        again = repeats.get(name, 0)
-        while (name if not again else f"{name}.{again}") in ordered:
-            again += 1
-        repeats[name] = again
-        ordered[f"{name}.{again}" if again else name] = None
+        name = wanted = given or (INDEX if k == 0 else f"c{k + 1}")
+        while name in ordered:
+            again[wanted] += 1
+            name = f"{wanted}.{again[wanted]}"
+        ordered[name] = None
     return list(ordered)
-
-
-def _lines_words(numbers: Sequence[int], what: str) -> str:
-    some = ", ".join(map(str, numbers[:4])) + (", ..." if len(numbers) > 4 else "")
-    several = what.replace("line ", "lines ", 1) if what.startswith("line ") else f"{what}s"
-    return f"left out: {counted(len(numbers), what, several)} (line {some})"
 
 
 def check_columns(path: Path, names: Sequence[str]) -> None:
