@@ -17,9 +17,11 @@ import numpy as np
 
 from graspsense.core.components.caller import option
 from graspsense.core.learn.confounding import LEAST_LINES, says_the_label
+from graspsense.core.learn.groups import cells_in_range
 from graspsense.core.values.errors import counted, listed
 from graspsense.sources.columns.column_guess import words_of
 from graspsense.sources.trial_table.identifiers import (
+    OF_MODELS,
     TIMES,
     are_even,
     can_be_days,
@@ -28,6 +30,7 @@ from graspsense.sources.trial_table.identifiers import (
     groups_of_labels,
     in_one_block_each,
     is_count,
+    is_regular,
     is_time,
     name_objects,
     names_only,
@@ -49,11 +52,16 @@ _OF_TIMES: Final = TIMES | {
 _OF_A_SESSION: Final = frozenset({
     "temperature", "temp", "humidity", "battery", "batt", "vbat", "baseline", "zero", "initial", "start", "before"
 })  # fmt: skip
+_CHANGES: Final = frozenset({
+    "slope", "stiffness", "rate", "rise", "drop", "change", "difference", "delta", "gradient", "cooling", "heating",
+    "crossing", "crossings", "compliance", "damping",
+})  # fmt: skip
+"""What the contact alone shows, by the name of a column; in a unit such as N/m also without it."""
 _RESULTS: Final = frozenset({
     "svm", "knn", "nn", "mlp", "cnn", "rf", "lda", "classifier", "model", "output", "out", "margin", "loss", "residual",
     "decision", "result", "outcome", "votes", "pvalue", "pval",
 })  # fmt: skip
-_OF_RESULTS: Final = frozenset({"value", "val", "distance", "dist", "function", "rank"})
+_OF_RESULTS: Final = OF_MODELS | {"value", "val", "distance", "dist", "function", "rank"}
 """What a model or a test says, by the name of a column."""
 _TEMPERATURES: Final = frozenset({"C", "\u00b0C", "degC"})
 """What can be the same, or drift, in a whole session; by the name of a column, or by its unit."""
@@ -71,6 +79,8 @@ _MOSTLY: Final = 0.75
 """Share of the lines of each label from which on a value may be the setting that this label was recorded with."""
 _EVEN: Final = 0.005
 """Probability that drawn values have numbers of lines as even as those of objects, below which it is told."""
+_SPARSE: Final = 4.0
+"""How many times as many values fit into the ranges of the labels as there are, if these are no coarse measurements."""
 _NEAR: Final = 3.0
 """Standard errors by which the mean of noise is away from zero at most."""
 _ROUNDED_SUM: Final = 0.02
@@ -78,6 +88,8 @@ _ROUNDED_SUM: Final = 0.02
 _ENOUGH_LINES: Final = 30
 _USUAL: Final = 2.0
 """Largest step between two labels over the median step within labels."""
+_STEADY: Final = 1.0
+"""Quartile range of the steps of what adds up over the trials, in any unit, over their median."""
 _THOUSAND: Final = 1000.0
 _GAP: Final = 100.0
 """Ratio of two neighbouring values between which the unit may change."""
@@ -89,8 +101,8 @@ _PROPORTIONAL: Final = 1.0 - 1e-6
 _DOUBTS: Final[Mapping[str, Mapping[str, str]]] = {
     "If it is the label or a prediction in other words, or a setting of the experiment, it reveals the labels: ": {
         "same": "all or most trials of each label have the same one of its few values",
-        "probabilities": "these are between 0 and 1, their sum is 1, and most trials of each label have the largest "
-        "one in one of them",
+        "probabilities": "their sum is the same in each line, and most trials of each label have the largest in one "
+        "of them",
         "result": "its name is that of the result of a model or a test, or has a label in it",
     },
     "If it tells when, how or with which object a trial was recorded, it reveals the labels: ": {
@@ -181,9 +193,13 @@ def _of_numbers(name: str, unit: str, values: Numbers, labels: Sequence[str]) ->
         yield "time"
     if is_count(unit) and is_result(name, labels if differs else ()):
         yield "result"
-    if differs and (_OF_A_SESSION & set(words_of(name)) or unit in _TEMPERATURES):
+    words = set(words_of(name))
+    state = differs and "/" not in unit and not _CHANGES & words
+    if state and (_OF_A_SESSION & words or unit in _TEMPERATURES):
         yield "session"
-    if of_time and passes_without_a_gap(values, labels):
+    known = np.unique(values[~np.isnan(values)])
+    steady = of_time or (len(known) > LEAST_LINES and is_regular(known, _STEADY))
+    if steady and passes_without_a_gap(values, labels):
         yield "without a gap"
     if digits_tell_labels(values, labels):
         yield "digits"
@@ -195,8 +211,10 @@ def _probabilities(numbers: dict[str, Numbers], labels: Sequence[str]) -> Iterat
     for begin in range(len(names) - n + 1):
         group = names[begin : begin + n]
         values = np.array([numbers[name] for name in group])
-        shares = n > 1 and (values >= 0.0).all() and (np.abs(values.sum(axis=0) - 1.0) <= _ROUNDED_SUM).all()
-        if shares and mostly_says_the_label(values.argmax(axis=0).tolist(), labels):
+        sums = (values if (values >= 0.0).all() else np.exp(values)).sum(axis=0)
+        # Of percentages and of votes, the sum is another number; logarithms are negative.
+        alike = (np.abs(sums - np.median(sums)) <= _ROUNDED_SUM * np.median(sums)).all()
+        if n > 1 and alike and mostly_says_the_label(values.argmax(axis=0).tolist(), labels):
             yield from group
 
 
@@ -222,9 +240,9 @@ def mostly_says_the_label(values: Sequence[Hashable], labels: Sequence[str], sha
 
 
 def is_code(values: Sequence[Any], labels: Sequence[str]) -> bool:
-    """Return whether the values of each label are a whole number of its own with noise, and these follow each other."""
+    """Return whether the values of each label are a whole number with noise, and these numbers follow each other."""
     codes = np.round(values)
-    if np.ptp(codes) != len(set(labels)) - 1 or not says_the_label(codes.tolist(), labels):
+    if np.ptp(codes) != len(np.unique(codes)) - 1 or not says_the_label(codes.tolist(), labels):
         return False
     noise = [np.subtract(values, codes)[codes == code] for code in np.unique(codes)]
     return all(abs(part.mean()) * len(part) ** 0.5 <= _NEAR * part.std() for part in noise)
@@ -266,7 +284,7 @@ def values_have_one_label(values: Sequence[str] | Sequence[float], labels: Seque
     """Return whether several lines have each value, all with one label, and there are more values than labels.
 
     Labels that share texts count as one, as those of an object that is open or closed. Numbers of a label that have a
-    range of their own are measured, unless each has about as many lines.
+    range of their own are measured, unless each has about as many lines, or they are too fine to repeat.
     """
     given = [pair for pair in zip(values, labels, strict=True) if pair[0] != "" and pair[0] == pair[0]]
     different = Counter(value for value, _ in given)
@@ -279,8 +297,13 @@ def values_have_one_label(values: Sequence[str] | Sequence[float], labels: Seque
     among = len({label for _, label in given})
     if not among < len(different) == len(set(given)):
         return False
-    ranges = sum(1 for _ in groupby(sorted(given), key=itemgetter(1)))
-    return texts or ranges > among or are_even([*different.values()], _EVEN)
+    if texts:
+        return True
+    ranges = [np.ptp([value for value, _ in part]) for _, part in groupby(sorted(given), itemgetter(1))]
+    distinct = np.array(sorted(different))
+    # Measured values as coarse as to repeat so often have others beside them.
+    fine = sum(ranges) * cells_in_range(distinct) > _SPARSE * len(distinct) * np.ptp(distinct)
+    return len(ranges) > among or bool(fine) or are_even([*different.values()], _EVEN)
 
 
 def passes_without_a_gap(values: Numbers, labels: Sequence[str]) -> bool:
@@ -369,6 +392,9 @@ def stand_in_of(known: Numbers) -> float | None:
         return None
     span = float(others.max() - others.min()) * (1.0 if times >= _OFTEN else _LONE)
     far = value < others.min() - span or value > others.max() + span
+    if far and times < _OFTEN and known.min() > 0.0:  # of other magnitudes
+        low, high = np.log([others.min(), others.max()])
+        far = 2.0 * max(np.log(value) - high, low - np.log(value)) > high - low
     apart = value != 0.0 or float(np.abs(others).min()) > _FROM_ZERO * float(np.ptp(others))
     often = times >= (LEAST_LINES if value else _OFTEN)
     different = int(repeats.max()) <= 2 and len(repeats) > (1.0 - _FEW) * len(others)

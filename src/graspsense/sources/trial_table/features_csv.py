@@ -79,6 +79,11 @@ def read_labelled(
     Raises ConfigError if a column does not exist or cannot be a label, DataDamaged if the file is not a valid table.
     """
     columns, export, label = _opened(path, label, {instance or "instance", order})
+    if label is not None and label in {instance, order}:
+        raise ConfigError(
+            f"{label!r} is the label: {option('instance', 'COLUMN')} names another column, which tells its objects "
+            f"apart, and {option('order', 'COLUMN')} that of the order of recording"
+        )
     notes = list(columns.notes)
     if export is not None:
         export.keep_complete_trials(label if value is None else None, notes)

@@ -43,11 +43,15 @@ _NAMES: Final = frozenset({
 _DIVISIONS: Final = frozenset({
     "seed", "trial", "fold", "kfold", "split", "is", "train", "training", "test", "testing", "validation",
     "holdout", "subset", "partition", "rep", "repeat", "repetition", "replicate", "attempt", "try", "take", "iteration",
-    "random", "uid", "uuid", "crc", "checksum", "chk", "hash", "sha", "pred", "prediction", "predicted", "proba",
-    "probability", "confidence", "certainty", "score", "logit", "likelihood", "yhat", "hat", "cluster", "correct",
+    "random", "uid", "uuid", "crc", "checksum", "chk", "hash", "sha",
 })  # fmt: skip
-"""What trials are told apart and divided by, and what a model said of them."""
-_OF_RECORDINGS: Final = _DIVISIONS | {
+"""What trials are told apart and divided by."""
+OF_MODELS: Final = frozenset({
+    "pred", "prediction", "predicted", "prob", "probs", "proba", "probability", "softmax", "posterior", "confidence",
+    "certainty", "score", "logit", "likelihood", "yhat", "hat", "cluster", "correct",
+})  # fmt: skip
+"""What a model said of trials."""
+_OF_RECORDINGS: Final = _DIVISIONS | OF_MODELS | {
     "session", "operator", "experimenter", "person", "participant", "subject", "user", "robot", "host", "lab", "site",
     "batch", "lot", "block", "series", "group", "round", "run", "cycle", "weekday", "day", "doy", "week", "month",
     "year", "date", "datetime", "file", "filename", "sitzung", "bediener", "proband", "datum", "wochentag", "tag",
@@ -86,8 +90,8 @@ _EPOCH_S: Final = (6.3e8, 4.2e9)
 """The years 1990 to 2100 in seconds since 1970."""
 _PER_SECOND: Final = (1.0, 1e3, 1e6, 1e9)
 """The units of such times."""
-_LONGEST_S: Final = 3.2e8
-"""Ten years, in which the trials of a table were recorded."""
+_APART_S: Final = 1.73e5
+"""Two days, which few trials of a table come apart."""
 NAME_OBJECTS: Final = "name the objects (say so by --instance)"
 NUMBER_OBJECTS: Final = "number the objects (name them by --instance)"
 NAME_THINGS: Final = "name the objects, which have several labels (say so by --instance)"
@@ -141,7 +145,7 @@ def groups_trials(name: str, values: Sequence[str], instances: Sequence[str] | N
     counts = Counter(filter(None, values))
     pairs = {pair for pair in zip(values, instances or range(len(values)), strict=True) if pair[0]}
     several = len(pairs) > len(counts) > 1 and min(counts.values()) > 1
-    return several and names_a_recording(name) and not _DIVISIONS & set(words_of(name))
+    return several and names_a_recording(name) and not (_DIVISIONS | OF_MODELS) & set(words_of(name))
 
 
 def identifies(
@@ -182,7 +186,7 @@ def identifies(
         turns = 2 * blocks > len(known) and differs_by_label(column, known)
         counts = len(values_of) >= _COUNTING and way >= 1.0 - _TIES and not turns
         follows = different and (way == 1.0 or in_labels)
-        like_clock = _is_regular(values_of) or (is_time(unit) and in_labels)
+        like_clock = is_regular(values_of) or (is_time(unit) and in_labels)
         if ((whole or named) and (counts or follows)) or (follows and like_clock):
             return "follow the order of the lines as a counter or a time does"
     if different:
@@ -190,7 +194,7 @@ def identifies(
             named and whole and len(values_of) == len(column)
         ):
             return "number the trials"
-        if len(values_of) == len(column) >= _SPACED and _is_regular(values_of, _ALIKE):
+        if len(values_of) == len(column) >= _SPACED and is_regular(values_of, _ALIKE):
             return "have equal steps, as those of a clock or a counter"
     return ""
 
@@ -242,7 +246,8 @@ def _is_calendar(column: NDArray[np.float64]) -> bool:
     if distinct > len(column) / 2 and any(
         low * unit <= least
         and most <= high * unit
-        and (distinct - 1) * unit <= most - least <= _LONGEST_S * unit
+        and (distinct - 1) * unit <= most - least
+        and np.median(np.diff(np.unique(column))) <= _APART_S * unit
         for unit in _PER_SECOND
     ):
         return True
@@ -339,7 +344,7 @@ def differs_by_label(values: NDArray[np.float64], labels: Sequence[str]) -> bool
     return bool(np.var(values[known] - means[codes]) < 0.5 * np.var(values[known]))
 
 
-def _is_regular(values: NDArray[np.float64], most: float = _IRREGULAR) -> bool:
+def is_regular(values: NDArray[np.float64], most: float = _IRREGULAR) -> bool:
     """Return whether the steps between these rising values are alike, as those of a clock are."""
     low, middle, high = np.quantile(np.diff(values), (0.25, 0.5, 0.75))
     return bool(high - low < most * middle)
