@@ -299,11 +299,8 @@ class _Evaluator:
                 what=default, reason=reason or "these trials have no such features"
             )
             return
-        rows, words, folds = (
-            np.flatnonzero(control.having).tolist(),
-            control.having_words,
-            self.headline.folds,
-        )
+        rows = np.flatnonzero(control.having).tolist()
+        words, folds = control.having_words, self.headline.folds
         if not rows or len(np.unique(folds[rows])) < 2:
             too_few = "; these are too few to learn from" if rows else ""
             self.controls[name] = RegressionMeasurement(what=control.what, reason=f"{words}{too_few}")

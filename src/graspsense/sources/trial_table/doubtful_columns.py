@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Hashable, Iterator, Mapping, Sequence
-from decimal import Decimal
-from itertools import groupby
+from decimal import Decimal, DecimalTuple
+from itertools import groupby, permutations
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any, Final
 
@@ -19,12 +19,11 @@ from graspsense.core.components.caller import option
 from graspsense.core.learn.confounding import LEAST_LINES, says_the_label
 from graspsense.core.learn.groups import cells_in_range
 from graspsense.core.values.errors import counted, listed
-from graspsense.sources.columns.column_guess import words_of
+from graspsense.sources.columns.column_guess import TIME_WORDS, words_of
 from graspsense.sources.trial_table.identifiers import (
-    OF_MODELS,
+    DIVISIONS,
     TIMES,
     are_even,
-    can_be_days,
     differs_by_label,
     follow_lines,
     groups_of_labels,
@@ -43,9 +42,7 @@ if TYPE_CHECKING:
     from graspsense.sources.formats.csv_columns import CsvColumns
     from graspsense.sources.formats.table import Numbers
 
-_TIME_NAMES: Final = frozenset({
-    "t", "time", "elapsed", "clock", "hour", "hours", "minute", "minutes", "timestamp"
-})  # fmt: skip
+_TIME_NAMES: Final = TIME_WORDS | {"hour", "hours", "minute", "minutes"}
 _OF_TIMES: Final = TIMES | {
     "rec", "recorded", "recording", "start", "begin", "end", "at", "of", "day", "since", "total",
 }  # fmt: skip
@@ -53,18 +50,16 @@ _OF_A_SESSION: Final = frozenset({
     "temperature", "temp", "humidity", "battery", "batt", "vbat", "baseline", "zero", "initial", "start", "before"
 })  # fmt: skip
 _CHANGES: Final = frozenset({
-    "slope", "stiffness", "rate", "rise", "drop", "change", "difference", "delta", "gradient", "cooling", "heating",
-    "crossing", "crossings", "compliance", "damping",
+    "slope", "stiffness", "rate", "rise", "drop", "change", "delta", "cooling", "crossing", "crossings",
 })  # fmt: skip
 """What the contact alone shows, by the name of a column; in a unit such as N/m also without it."""
 _RESULTS: Final = frozenset({
     "svm", "knn", "nn", "mlp", "cnn", "rf", "lda", "classifier", "model", "output", "out", "margin", "loss", "residual",
     "decision", "result", "outcome", "votes", "pvalue", "pval",
 })  # fmt: skip
-_OF_RESULTS: Final = OF_MODELS | {"value", "val", "distance", "dist", "function", "rank"}
+_OF_RESULTS: Final = DIVISIONS | {"value", "val", "distance", "dist", "function", "rank"}
 """What a model or a test says, by the name of a column."""
-_TEMPERATURES: Final = frozenset({"C", "\u00b0C", "degC"})
-"""What can be the same, or drift, in a whole session; by the name of a column, or by its unit."""
+"""What can be the same, or drift, in a whole session, by the name of a column."""
 _OFTEN: Final = 3
 """Lines with the same value from which on it may stand for something else than a measurement."""
 _FROM_ZERO: Final = 0.15
@@ -111,12 +106,10 @@ _DOUBTS: Final[Mapping[str, Mapping[str, str]]] = {
         "missing": "some labels have nearly all of its values, and others hardly any",
         "order": "its values follow the order of recording within each label, as a drifting zero, a battery or a clock "
         "does",
+        "time": "its name is that of a time",
         "session": "it is from before the contact, or can drift in a session, by its name or unit",
         "without a gap": "its values pass from label to label without a gap or an overlap, as those of a clock or a "
         "counter do",
-    },
-    "If it is the time of recording, it reveals the labels: name it as the order, or ": {
-        "time": "its name is that of a time, or its values can be dates as spreadsheets and MATLAB number them",
     },
     "Digits tell the labels: round all values alike, or ": {
         "digits": "it is written with fewer digits for some labels than for others",
@@ -163,7 +156,7 @@ def doubts(
         for reason, what in shown.items()
         if doubted.get(reason)
     ]
-    return notes + _mixed(numbers) + list(_pads_apart(numbers))
+    return [*notes, *_mixed(numbers), *_pads_apart(numbers)]
 
 
 def _of_recording(columns: CsvColumns, name: str, labels: Sequence[str]) -> Iterator[str]:
@@ -189,13 +182,13 @@ def _of_numbers(name: str, unit: str, values: Numbers, labels: Sequence[str]) ->
     in_blocks = LEAST_LINES * sum(1 for _ in groupby(labels)) <= len(labels)
     if (differs or in_blocks) and follow_lines(values, labels):
         yield "order"
-    if of_time and (names_only(name, _TIME_NAMES, _OF_TIMES) or can_be_days(values)):
+    if of_time and names_only(name, _TIME_NAMES, _OF_TIMES):
         yield "time"
     if is_count(unit) and is_result(name, labels if differs else ()):
         yield "result"
     words = set(words_of(name))
     state = differs and "/" not in unit and not _CHANGES & words
-    if state and (_OF_A_SESSION & words or unit in _TEMPERATURES):
+    if state and (_OF_A_SESSION & words or unit in ("C", "\u00b0C", "degC")):
         yield "session"
     known = np.unique(values[~np.isnan(values)])
     steady = of_time or (len(known) > LEAST_LINES and is_regular(known, _STEADY))
@@ -213,7 +206,8 @@ def _probabilities(numbers: dict[str, Numbers], labels: Sequence[str]) -> Iterat
         values = np.array([numbers[name] for name in group])
         sums = (values if (values >= 0.0).all() else np.exp(values)).sum(axis=0)
         # Of percentages and of votes, the sum is another number; logarithms are negative.
-        alike = (np.abs(sums - np.median(sums)) <= _ROUNDED_SUM * np.median(sums)).all()
+        wholes = (float(np.median(sums)),) if (values == np.floor(values)).all() else (1.0, 100.0)
+        alike = any((np.abs(sums - whole) <= _ROUNDED_SUM * whole).all() for whole in wholes)
         if n > 1 and alike and mostly_says_the_label(values.argmax(axis=0).tolist(), labels):
             yield from group
 
@@ -262,21 +256,19 @@ def digits_tell_labels(values: Numbers, labels: Sequence[str]) -> bool:
 
     Only digits that were rounded count, and not those of numbers of another magnitude.
     """
-    given: dict[str, list[float]] = {}
+    given: dict[str, list[DecimalTuple]] = {}
     for label, value in zip(labels, values.tolist(), strict=True):
-        given.setdefault(label, []).extend([value] if value == value else [])
-    written: dict[str, list[tuple[int, int]]] = {}
-    for label, numbers in given.items():
-        if len(numbers) >= LEAST_LINES and len(set(numbers)) >= _OFTEN:
-            decimals = [Decimal(repr(value)).normalize().as_tuple() for value in numbers]
-            written[label] = [(-int(number.exponent), len(number.digits)) for number in decimals]
-    most = {label: (max(all_of)[0], max(digits for _, digits in all_of)) for label, all_of in written.items()}
+        if value == value:
+            given.setdefault(label, []).append(Decimal(repr(value)).normalize().as_tuple())
+    places_and_digits = [
+        np.array([(-int(number.exponent), len(number.digits)) for number in numbers])
+        for numbers in given.values()
+        if len(numbers) >= LEAST_LINES and len(set(numbers)) >= _OFTEN
+    ]
     return any(
-        places < most[other][0]
-        and digits < min(most[other][1], _ROUNDED)
-        and 2 * sum(finer > places for finer, _ in all_of) > len(all_of)
-        for places, digits in most.values()
-        for other, all_of in written.items()
+        (coarse.max(axis=0) < np.minimum(fine.max(axis=0), (np.inf, _ROUNDED))).all()
+        and float((fine[:, 0] > coarse[:, 0].max()).mean()) > 0.5
+        for coarse, fine in permutations(places_and_digits, 2)
     )
 
 
@@ -300,7 +292,7 @@ def values_have_one_label(values: Sequence[str] | Sequence[float], labels: Seque
     if texts:
         return True
     ranges = [np.ptp([value for value, _ in part]) for _, part in groupby(sorted(given), itemgetter(1))]
-    distinct = np.array(sorted(different))
+    distinct = np.unique([value for value, _ in given])
     # Measured values as coarse as to repeat so often have others beside them.
     fine = sum(ranges) * cells_in_range(distinct) > _SPARSE * len(distinct) * np.ptp(distinct)
     return len(ranges) > among or bool(fine) or are_even([*different.values()], _EVEN)
@@ -340,23 +332,21 @@ def follows_from(values: Numbers, target: Numbers) -> bool:
     return pairs == of_target and bool(rises) and len(set(values.tolist())) >= LEAST_LINES
 
 
-def _mixed(numbers: dict[str, Numbers]) -> list[str]:
-    """Return notes on columns in which a number stands for something else, or whose unit changes."""
-    notes = []
+def _mixed(numbers: dict[str, Numbers]) -> Iterator[str]:
+    """Yield notes on columns in which a number stands for something else, or whose unit changes."""
     for name, values in numbers.items():
         known = values[~np.isnan(values)]
         stand_in = stand_in_of(known)
         if stand_in is not None:
             times = int((known == stand_in).sum())
-            notes.append(
+            yield (
                 f"{name} is {stand_in:g} in {counted(times, 'trial')}, unlike all other values: if it stands for a "
                 "missing value, or a sensor had stopped or was at the end of its range, leave the cell empty"
             )
         elif unit_changes(known):
-            notes.append(
+            yield (
                 f"{name} has two groups of values, one a thousand times the other: make sure that all have one unit"
             )
-    return notes
 
 
 def _pads_apart(numbers: dict[str, Numbers]) -> Iterator[str]:
