@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from decimal import Decimal, DecimalTuple
-from itertools import groupby, permutations
+from itertools import chain, groupby, permutations
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any, Final
 
@@ -140,11 +140,10 @@ def doubts(
     doubted: dict[str, list[str]] = {}
     for name in used if target is None else numbers:
         if target is not None:
-            reasons = [*_of_target(numbers[name], np.array(target.values)[lines])]
+            reasons = _of_target(numbers[name], np.array(target.values)[lines])
         else:
-            reasons = [*_of_recording(columns, name, labels)]
-            if name in numbers:
-                reasons += _of_numbers(name, columns.units[name], numbers[name], labels)
+            further = _of_numbers(name, columns.units[name], numbers[name], labels) if name in numbers else ()
+            reasons = chain(_of_recording(columns, name, labels), further)
         for reason in reasons:
             doubted.setdefault(reason, []).append(name)
     if target is None:
@@ -190,9 +189,7 @@ def _of_numbers(name: str, unit: str, values: Numbers, labels: Sequence[str]) ->
     state = differs and "/" not in unit and not _CHANGES & words
     if state and (_OF_A_SESSION & words or unit in ("C", "\u00b0C", "degC")):
         yield "session"
-    known = np.unique(values[~np.isnan(values)])
-    steady = of_time or (len(known) > LEAST_LINES and is_regular(known, _STEADY))
-    if steady and passes_without_a_gap(values, labels):
+    if passes_without_a_gap(values, labels, np.inf if of_time else _STEADY):
         yield "without a gap"
     if digits_tell_labels(values, labels):
         yield "digits"
@@ -298,10 +295,11 @@ def values_have_one_label(values: Sequence[str] | Sequence[float], labels: Seque
     return len(ranges) > among or bool(fine) or are_even([*different.values()], _EVEN)
 
 
-def passes_without_a_gap(values: Numbers, labels: Sequence[str]) -> bool:
+def passes_without_a_gap(values: Numbers, labels: Sequence[str], uneven: float) -> bool:
     """Return whether each label has a range of its own, and no two ranges are farther apart than values within one.
 
-    Two classes of normally distributed values that do not overlap lie so closely in about 2 of 100 columns.
+    The quartile range of the steps is less than `uneven` times their median. Two classes of normally distributed values
+    that do not overlap lie so closely in about 2 of 100 columns.
     """
     known = np.flatnonzero(~np.isnan(values))
     order = known[np.argsort(values[known], kind="stable")]
@@ -311,7 +309,8 @@ def passes_without_a_gap(values: Numbers, labels: Sequence[str]) -> bool:
         return False
     steps = np.diff(values[order])
     usual = float(np.median(np.delete(steps, ends)))
-    return bool((steps[ends] > 0.0).all() and (steps[ends] <= _USUAL * usual).all())
+    touching = (steps[ends] > 0.0).all() and (steps[ends] <= _USUAL * usual).all()
+    return bool(touching) and is_regular(values[order], uneven)
 
 
 def follows_from(values: Numbers, target: Numbers) -> bool:
@@ -382,9 +381,6 @@ def stand_in_of(known: Numbers) -> float | None:
         return None
     span = float(others.max() - others.min()) * (1.0 if times >= _OFTEN else _LONE)
     far = value < others.min() - span or value > others.max() + span
-    if far and times < _OFTEN and known.min() > 0.0:  # of other magnitudes
-        low, high = np.log([others.min(), others.max()])
-        far = 2.0 * max(np.log(value) - high, low - np.log(value)) > high - low
     apart = value != 0.0 or float(np.abs(others).min()) > _FROM_ZERO * float(np.ptp(others))
     often = times >= (LEAST_LINES if value else _OFTEN)
     different = int(repeats.max()) <= 2 and len(repeats) > (1.0 - _FEW) * len(others)

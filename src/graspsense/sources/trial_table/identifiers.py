@@ -187,13 +187,11 @@ def identifies(
         like_clock = is_regular(values_of) or (is_time(unit) and in_labels)
         if ((whole or named) and (counts or follows)) or (follows and like_clock):
             return "follow the order of the lines as a counter or a time does"
-    if different:
-        if _hardly_repeats(len(column), len(values_of), cells) or (
-            named and whole and len(values_of) == len(column)
-        ):
-            return "number the trials"
-        if len(values_of) == len(column) >= _SPACED and is_regular(values_of, _ALIKE):
-            return "have equal steps, as those of a clock or a counter"
+    no_ties = len(values_of) == len(column)
+    if different and (_hardly_repeats(len(column), len(values_of), cells) or (named and whole and no_ties)):
+        return "number the trials"
+    if no_ties and len(column) >= _SPACED and is_regular(values_of, _ALIKE):
+        return "have equal steps, as those of a clock or a counter"
     return ""
 
 
@@ -216,13 +214,12 @@ def text_identifies(texts: Sequence[str], labels: Sequence[str]) -> str:
     numbered = all(re.search(r"\d", text) for text in counts)
     hardly = len(counts) > max(2, len(given) * _MOST_VALUES)
     for known, why in ((own, NAME_OBJECTS), (groups_of_labels(values, own), NAME_THINGS)):
-        if name_objects(values, known):
+        of_one_label = len(set(zip(values, known, strict=True))) == len(counts)
+        several = numbered and not hardly and _enough_objects(len(counts), known)
+        if name_objects(values, known) or (several and of_one_label):
             return why
         if hardly:
             return "are texts that hardly repeat, as names of trials, files and remarks do"
-        pairs = len(set(zip(values, known, strict=True)))
-        if numbered and _enough_objects(len(counts), known) and pairs == len(counts):
-            return why
     return ""
 
 
@@ -388,8 +385,7 @@ def groups_of_labels(values: Sequence[Hashable], labels: Sequence[str]) -> list[
     label_of: dict[Hashable, str] = {}
     for value, label in dict.fromkeys(zip(values, labels, strict=True)):
         kept, joined = group[label_of.setdefault(value, label)], group[label]
-        if kept != joined:
-            group = {name: kept if head == joined else head for name, head in group.items()}
+        group = {name: kept if head == joined else head for name, head in group.items()}
     several = Counter(group[label] for label in label_of.values())
     apart = len(several) > 1 and min(several.values()) > 1
     return [group[label] if apart else label for label in labels]
