@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
@@ -26,8 +26,11 @@ from graspsense.core.components.registry import installed
 from graspsense.core.values.errors import ConfigError, listed
 from graspsense.core.values.features import UNKNOWN, Prediction, assumed_units
 from graspsense.core.values.label_text import alike_words, natural_order, spelled_alike
-from graspsense.evaluation.intervals import rate_of
+from graspsense.evaluation.intervals import RecognitionRate, rate_of
 from graspsense.evaluation.json_codec import to_json
+
+if TYPE_CHECKING:
+    from graspsense.core.learn.labelled import Labelled
 
 MOST_WITH_REASONS: Final = 1000
 """Largest number of trials whose predictions are given with reasons, which take about a millisecond each."""
@@ -79,12 +82,7 @@ def predict(model: str, source: str, **given: Any) -> None:
         notes = (*notes, f"more than {MOST_WITH_REASONS} trials: the predictions have no reasons")
     learned = learned_from(asked.learned_from, table.columns(asked.names))
     labels = None if labelled is None else labelled.labels
-    rate = None
-    if labelled is not None:
-        right = [
-            prediction.label == label for prediction, label in zip(predictions, labelled.labels, strict=True)
-        ]
-        rate = rate_of(right, labelled.instances, learned or labelled.no_interval)
+    rate = None if labelled is None else _rate(predictions, labelled, learned)
     warnings = list(dict.fromkeys(warning for prediction in predictions for warning in prediction.warnings))
     if learned:
         warnings.append(f"{learned}: their predictions say nothing of other trials")
@@ -120,6 +118,14 @@ def _refuse_swapped(model: str, source: str) -> None:
         raise click.UsageError(
             f"{model} is not a model, and {source} is one. The model comes first: graspsense predict {source} {model}"
         )
+
+
+def _rate(predictions: Sequence[Prediction], labelled: Labelled, learned: str) -> RecognitionRate:
+    """Return the rate of these predictions; `learned` says which trials were learned from, and leaves no interval."""
+    right = [
+        prediction.label == label for prediction, label in zip(predictions, labelled.labels, strict=True)
+    ]
+    return rate_of(right, labelled.instances, learned or labelled.no_interval)
 
 
 def _print(predictions: Sequence[Prediction], labels: tuple[str, ...] | None) -> None:

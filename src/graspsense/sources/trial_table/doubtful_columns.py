@@ -17,7 +17,6 @@ import numpy as np
 
 from graspsense.core.components.caller import option
 from graspsense.core.learn.confounding import LEAST_LINES, says_the_label
-from graspsense.core.learn.groups import cells_in_range
 from graspsense.core.values.errors import counted, listed
 from graspsense.sources.columns.column_guess import TIME_WORDS, words_of
 from graspsense.sources.trial_table.identifiers import (
@@ -74,8 +73,6 @@ _MOSTLY: Final = 0.75
 """Share of the lines of each label from which on a value may be the setting that this label was recorded with."""
 _EVEN: Final = 0.005
 """Probability that drawn values have numbers of lines as even as those of objects, below which it is told."""
-_SPARSE: Final = 4.0
-"""How many times as many values fit into the ranges of the labels as there are, if these are no coarse measurements."""
 _NEAR: Final = 3.0
 """Standard errors by which the mean of noise is away from zero at most."""
 _ROUNDED_SUM: Final = 0.02
@@ -273,7 +270,7 @@ def values_have_one_label(values: Sequence[str] | Sequence[float], labels: Seque
     """Return whether several lines have each value, all with one label, and there are more values than labels.
 
     Labels that share texts count as one, as those of an object that is open or closed. Numbers of a label that have a
-    range of their own are measured, unless each has about as many lines, or they are too fine to repeat.
+    range of their own are measured, unless each has about as many lines.
     """
     given = [pair for pair in zip(values, labels, strict=True) if pair[0] != "" and pair[0] == pair[0]]
     different = Counter(value for value, _ in given)
@@ -286,13 +283,8 @@ def values_have_one_label(values: Sequence[str] | Sequence[float], labels: Seque
     among = len({label for _, label in given})
     if not among < len(different) == len(set(given)):
         return False
-    if texts:
-        return True
-    ranges = [np.ptp([value for value, _ in part]) for _, part in groupby(sorted(given), itemgetter(1))]
-    distinct = np.unique([value for value, _ in given])
-    # Measured values as coarse as to repeat so often have others beside them.
-    fine = sum(ranges) * cells_in_range(distinct) > _SPARSE * len(distinct) * np.ptp(distinct)
-    return len(ranges) > among or bool(fine) or are_even([*different.values()], _EVEN)
+    ranges = sum(1 for _ in groupby(sorted(given), key=itemgetter(1)))
+    return texts or ranges > among or are_even([*different.values()], _EVEN)
 
 
 def passes_without_a_gap(values: Numbers, labels: Sequence[str], uneven: float) -> bool:
