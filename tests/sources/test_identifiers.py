@@ -237,7 +237,6 @@ DOUBTFUL = {
         [45352.375 + 0.0007 * i + 0.02 * (i >= 30) + 1e-4 * (i % 7) for i in range(N)],
     ),
     "days of MATLAB": ("x", [739312.375 + i // 20 + 0.0007 * (i % 20) ** 1.1 for i in range(N)]),
-    "an operator, mostly": ("who", ["ann" if i < 28 else "ben" for i in range(N)]),
     "values of one label only": ("x", [*NOISE[:30], *[""] * 30]),
     "values of hardly any trial of a label": ("x", [*NOISE[:33], *[""] * 27]),
     "fewer digits for a label": ("x", [*NOISE[:30], *map(round, NOISE[30:])]),
