@@ -74,9 +74,11 @@ def test_a_table_in_another_encoding_is_the_same_table(csv, encoding):
 
 def test_a_unit_in_every_cell_is_that_of_the_column_and_labels_keep_theirs(csv):
     rows = [(f"{500 * (1 + i % 2)} g", f"{6 + i % 2},{i}", f"{i % 3}.5 mm" if i else "nan") for i in range(8)]
-    read = read_labelled(csv("size;force (N);gap\n" + "".join(f"{';'.join(row)}\n" for row in rows)), "size")
+    read = read_labelled(
+        csv("size;force (N);gap;f (min)\n" + "".join(f"{';'.join(row)};2\n" for row in rows)), "size"
+    )
     assert set(read.labels) == {"500 g", "1000 g"}
-    assert (read.table.names, read.table.units) == (("force (N)", "gap"), ("N", "mm"))
+    assert (read.table.names, read.table.units) == (("force (N)", "gap", "f (min)"), ("N", "mm", ""))
     assert read.table.values[:2, 0].tolist() == [6.0, 7.1]
 
 

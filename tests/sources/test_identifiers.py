@@ -238,7 +238,6 @@ DOUBTFUL = {
         [45352.375 + 0.0007 * i + 0.02 * (i >= 30) + 1e-4 * (i % 7) for i in range(N)],
     ),
     "days of MATLAB": ("x", [739312.375 + i // 20 + 0.0007 * (i % 20) ** 1.1 for i in range(N)]),
-    "an operator, mostly": ("who", ["ann" if i < 28 else "ben" for i in range(N)]),
     "values of one label only": ("x", [*NOISE[:30], *[""] * 30]),
     "values of hardly any trial of a label": ("x", [*NOISE[:33], *[""] * 27]),
     "fewer digits for a label": ("x", [*NOISE[:30], *map(round, NOISE[30:])]),
@@ -251,10 +250,6 @@ DOUBTFUL = {
     "a gap before the contact": (
         "gap_at_start [mm]",
         [80.0 + i // 10 + RNG.normal(0.0, 0.1) for i in range(N)],
-    ),
-    "a level that most trials of a label have": (
-        "level [N]",
-        [5 + 5 * ((i > 29) != (i % 9 == 0)) for i in range(N)],
     ),
     "who grasped most trials of a label, and others": (
         "handler",
@@ -272,11 +267,9 @@ DOUBTFUL = {
     "a lid": ("lid", ["aba"[i // 20] for i in range(N)], THREE),
     # In the order of the lines.
     "a battery": ("kind [V]", 12.6 - 0.01 * np.arange(N) + RNG.normal(0.0, 0.02, N), LABELS, range(N)),
-    "a very noisy counter": ("kind [V]", np.arange(N) + RNG.normal(0.0, 2.0, N), LABELS, range(N)),
-    "a zero": ("kind [V]", ZERO, LABELS, range(N)),
-    "kelvin": ("kind [V]", 300.0 + 0.05 * np.arange(N) + RNG.normal(0.0, 0.1, N), LABELS, range(N)),
     "a version": ("kind", [1.2 if i < 27 else 1.3 for i in range(N)], LABELS, range(N)),
-    "a value far from all others": ("kind [V]", [*NOISE[:-1], 1e9], LABELS, range(N)),
+    "what adds up over the trials": ("energy [J]", np.cumsum(RNG.uniform(0.5, 2.0, N)).round(3)),
+    "a probability": ("svm_prob", [*NOISE[:30], *(value + 4.0 for value in NOISE[30:])]),
     "a single code for a missing value": ("kind [V]", [*NOISE[:-1], -9999.0], LABELS, range(N)),
 }
 
@@ -304,11 +297,13 @@ def test_what_drifts_is_told_in_the_order_of_recording(tmp_path):
     [
         *((heading, NOISE) for heading in ("robot_force", "day_temperature", "number", "rise_time [s]")),
         ("gap_at_start [m]", [0.0797] * N),
+        ("initial_stiffness [N/m]", [*NOISE[:30], *(value + 4.0 for value in NOISE[30:])]),
         # What a sensor gives, or a part of a name says, is no result of a model.
         ("output [V]", NOISE),
         ("loss_factor", NOISE),
         # As large as seconds since 1970, and over more years than a table is recorded in.
         ("stiffness", [3e8 * value for value in NOISE]),
+        ("stiffness", [1.5e9 + 1e7 * value for value in NOISE]),
         # Slips are often zero.
         ("slip [mm]", [max(value - 6.0, 0.0) for value in NOISE]),
         # A setting that all labels have.
@@ -429,3 +424,5 @@ def test_sessions_that_are_not_held_out_are_told(tmp_path):
     assert "session" in told[0]
     told = [note for note in read_labelled(path, "object").notes if note.startswith("not held out")]
     assert len(told) == 2
+    with pytest.raises(ConfigError, match="is the label"):
+        read_labelled(path, "object", instance="object")

@@ -115,19 +115,13 @@ def _print(ranking: Ranking) -> None:
     echo()
     echo_found(ranking_table(ranking))
     echo_entries("note", ranking.notes)
-    default = next(
-        (
-            candidate
-            for candidate in ranking.candidates
-            if candidate.classifier == DEFAULT_CLASSIFIER and candidate.features in DEFAULT_FEATURES
-        ),
-        None,
-    )
-    if default is not None and default.standing == "worse":
-        echo_entry(
-            "advice",
-            f"the default, {default.name}, is worse on these trials: train --choose finds what suits them",
-        )
+    for candidate in ranking.candidates:
+        is_default = candidate.classifier == DEFAULT_CLASSIFIER and candidate.features in DEFAULT_FEATURES
+        if is_default and candidate.standing == "worse":
+            echo_entry(
+                "advice",
+                f"the default, {candidate.name}, is worse on these trials: train --choose finds what suits them",
+            )
 
 
 def _names(text: str, option: str, role: Role) -> tuple[str, ...]:

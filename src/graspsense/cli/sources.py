@@ -23,7 +23,7 @@ from graspsense.cli.output import file_to_write
 from graspsense.cli.progress import ProgressLine
 from graspsense.core.components.entries import TABLE_OF_ROLE
 from graspsense.core.components.registry import installed
-from graspsense.core.components.strict import ValidationFailed, nearest_path, structured
+from graspsense.core.components.strict import nearest_path
 from graspsense.core.settings.layers import Flag, Merged, option_layers, typed_path
 from graspsense.core.settings.resolved import Settings, default_paths, resolve
 from graspsense.core.settings.selected import SelectedComponent, build
@@ -187,28 +187,19 @@ def trials_of(
     """
     from graspsense.core.learn.copies import without_copies
     from graspsense.core.learn.groups import with_sessions
-    from graspsense.sources.trial_source import TrialSource, groups_of, kind_of, labelled_trials
+    from graspsense.sources.trial_source import described_trials, groups_of, kind_of, labelled_trials
 
     kind = kind_of(source)
     _refuse_misplaced(kind)
     values = {
         **{key: given[key] for key in _SAME_KEYS},
-        "source": source,
         "columns": _names("features", given),
         "before": _names("before", given),
         "value": given["target_value"],
         "objects": _names("objects", given),
         "checkpoints_s": tuple(checkpoints_s),
     }
-    try:
-        described = structured(values, TrialSource, source)
-    except ValidationFailed as misfit:
-        raise ConfigError(
-            "\n".join(
-                f"{'SOURCE' if problem.path == ('source',) else dashed(str(problem.path[0]))}: {problem.words()}"
-                for problem in misfit.problems
-            )
-        ) from None
+    described = described_trials(source, values, lambda key: "SOURCE" if key == "source" else dashed(key))
     if kind == SIMULATED and folds is not None:
         from graspsense.evaluation.folds import check_folds
         from graspsense.sources.simulated import number_of_trials

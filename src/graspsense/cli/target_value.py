@@ -181,10 +181,8 @@ def _print_evaluation(evaluation: RegressionEvaluation) -> None:
     echo_entries("WARNING", evaluation.warnings, Style.CAUTION)
     echo()
     echo_entry("error", f"{evaluation.headline.words(evaluation.unit)}, by {evaluation.protocol}")
-    echo_entry(
-        "",
-        f"root of the mean squared error {with_unit(f'{evaluation.headline.root_mean_square:.4g}', evaluation.unit)}",
-    )
+    root = with_unit(f"{evaluation.headline.root_mean_square:.4g}", evaluation.unit)
+    echo_entry("", f"root of the mean squared error {root}")
     if evaluation.explained is not None:
         echo_entry("R2", f"{evaluation.explained:.2f} (1 is perfect, 0 is no better than the mean)")
     intervals = evaluation.intervals

@@ -12,9 +12,13 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from graspsense.core.components.caller import option
+from graspsense.core.learn.labelled import Labelled
 from graspsense.core.learn.one_thread import one_thread
 from graspsense.core.learn.scaling import mean_and_deviation, scaling_of
+from graspsense.core.learn.target_value import TargetValue
 from graspsense.core.values.errors import ConfigError, counted, suggestion
+from graspsense.core.values.features import LARGEST_VALUE
 
 DEFAULT_ESTIMATOR: Final = "forest"
 
@@ -30,6 +34,20 @@ ESTIMATORS: Final[Mapping[str, tuple[str, Mapping[str, Any]]]] = {
     "tree": ("tree.DecisionTreeRegressor", {"min_samples_leaf": 2}),
 }
 """Name to the class in scikit-learn and its settings."""
+
+
+def target_of(labelled: Labelled) -> TargetValue:
+    """Return the numbers to predict. Raises ConfigError if there are none, or nothing to learn from them."""
+    target = labelled.value
+    if target is None:
+        named = option("target_value", python="value")
+        raise ConfigError(f"{labelled.source} has no number to predict: name it with {named}")
+    # The squares of smaller differences can be 0.
+    if not max(target.values) - min(target.values) >= 1.0 / LARGEST_VALUE:
+        raise ConfigError(
+            f"every trial of {labelled.source} has the same {target.name}, or nearly: there is nothing to predict"
+        )
+    return target
 
 
 def _unfitted(name: str, seed: int, trials: int) -> Any:

@@ -5,17 +5,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property, partial
 
 import numpy as np
 from attrs import define, field, frozen
 from numpy.typing import NDArray
 
-from graspsense.core.components.caller import option
 from graspsense.core.learn.conformal import COVERAGE
 from graspsense.core.learn.labelled import ControlFeatures, Labelled
-from graspsense.core.values.errors import ConfigError, counted
+from graspsense.core.values.errors import counted
 from graspsense.core.values.units import with_unit
 from graspsense.evaluation.controls import EARLY
 from graspsense.evaluation.evaluator import Progress
@@ -30,7 +29,7 @@ from graspsense.evaluation.folds import (
 )
 from graspsense.evaluation.gathered_warnings import gathered_warnings
 from graspsense.evaluation.intervals import MIN_INSTANCES, Difference, rate_of
-from graspsense.regression.estimators import FittedRegression, check_estimator
+from graspsense.regression.estimators import FittedRegression, check_estimator, target_of
 from graspsense.regression.intervals import intervals_of
 from graspsense.regression.results import (
     IntervalCoverage,
@@ -55,15 +54,7 @@ def evaluate_regression(
     Raises ConfigError for an unknown estimator, if there is no number or only one, or if there are too few trials.
     """
     check_estimator(estimator)
-    target = labelled.value
-    if target is None:
-        raise ConfigError(
-            f"{labelled.source} has no number to predict: name it with {option('target_value', python='value')}"
-        )
-    if len(set(target.values)) < 2:
-        raise ConfigError(
-            f"every trial of {labelled.source} has the same {target.name}: there is nothing to predict"
-        )
+    target = target_of(labelled)
     notes = list(labelled.notes)
     evaluator = _Evaluator(estimator, labelled, np.array(target.values), folds, seed, progress)
     with gathered_warnings(notes):
@@ -226,35 +217,31 @@ class _Evaluator:
             mean_half_width=float(radii.mean()),
         )
 
-    def warnings(self) -> list[str]:
-        """Return what the controls say against the headline."""
-        unit, texts = self.trials.value.unit if self.trials.value is not None else "", []
+    def warnings(self) -> Iterator[str]:
+        """Yield what the controls say against the headline."""
+        unit = self.trials.value.unit if self.trials.value is not None else ""
         if not _is_worse(self.controls["mean_only"]):
-            texts.append("the error is not shown to be below that of always predicting the mean")
+            yield "the error is not shown to be below that of always predicting the mean"
         for name, when in EARLY.items():
             held = self.held_out.get(name)
             if held is not None and self._difference(self.mean, held).is_positive:
-                texts.append(
+                yield (
                     f"from {when} alone the error is {self.error(held).words(unit)}, below that of the mean: the "
                     "recording itself reveals the number"
                 )
         width = self.controls["width_only"]
         if width.difference is not None and width.difference.interval is not None and not _is_worse(width):
-            texts.append(
-                "the error with the width alone is not shown to be larger: the squeeze may not add anything"
-            )
-        for name, why in (
-            (
-                held_out_protocol(self.trials),
-                "part of the accuracy within folds comes from having seen the same objects",
-            ),
-            ("recording_order", "part of the accuracy within folds comes from the time of recording"),
-        ):
-            if _is_worse(self.controls[name]):
-                by = self.controls[name].difference
-                assert by is not None
-                texts.append(f"the error of {name} is larger by {with_unit(f'{by.value:.4g}', unit)}: {why}")
-        return texts
+            yield "the error with the width alone is not shown to be larger: the squeeze may not add anything"
+        for name, what in {
+            held_out_protocol(self.trials): "having seen the same objects",
+            "recording_order": "the time of recording",
+        }.items():
+            by = self.controls[name].difference
+            if by is not None and by.is_positive:
+                yield (
+                    f"the error of {name} is larger by {with_unit(f'{by.value:.4g}', unit)}: part of the accuracy "
+                    f"within folds comes from {what}"
+                )
 
     def _instances_of(self, rows: Sequence[int]) -> list[str] | None:
         return None if self.instances is None else [self.instances[i] for i in rows]
@@ -285,10 +272,8 @@ class _Evaluator:
 
     def _against(self, what: str, held: _HeldOut, other: _HeldOut) -> RegressionMeasurement:
         """Return the error with its difference from another protocol."""
-        by = self._difference(held, other)
-        return RegressionMeasurement(
-            what=what, error=self.error(held), difference=by, difference_of=other.name
-        )
+        error, by = self.error(held), self._difference(held, other)
+        return RegressionMeasurement(what=what, error=error, difference=by, difference_of=other.name)
 
     def _other_features(self, name: str, control: ControlFeatures | None, default: str, reason: str) -> None:
         """Measure the error with other features, among the trials that have any of them."""
@@ -297,11 +282,8 @@ class _Evaluator:
                 what=default, reason=reason or "these trials have no such features"
             )
             return
-        rows, words, folds = (
-            np.flatnonzero(control.having).tolist(),
-            control.having_words,
-            self.headline.folds,
-        )
+        rows = np.flatnonzero(control.having).tolist()
+        words, folds = control.having_words, self.headline.folds
         if not rows or len(np.unique(folds[rows])) < 2:
             too_few = "; these are too few to learn from" if rows else ""
             self.controls[name] = RegressionMeasurement(what=control.what, reason=f"{words}{too_few}")

@@ -32,7 +32,7 @@ from graspsense.core.values.errors import ConfigError, DataDamaged, counted
 from graspsense.core.values.features import FeatureTable, misfit
 from graspsense.core.values.json_values import json_ready
 from graspsense.evaluation.folds import splits
-from graspsense.regression.estimators import ESTIMATORS, FittedRegression
+from graspsense.regression.estimators import ESTIMATORS, FittedRegression, target_of
 from graspsense.regression.evaluate import held_out_folds, held_out_predictions
 from graspsense.regression.intervals import PredictionIntervals, intervals_from, intervals_of
 
@@ -148,9 +148,7 @@ def train_regression(
 
     Raises ConfigError if nothing can be learned from them.
     """
-    target = labelled.value
-    if target is None or len(set(target.values)) < 2:
-        raise ConfigError(f"{labelled.source} has fewer than two different numbers to learn from")
+    target = target_of(labelled)
     values = np.array(target.values)
     try:
         folds = held_out_folds(labelled, min(FOLDS, len(values)), seed)

@@ -95,6 +95,15 @@ def names_no_object(keys: Mapping[str, Any]) -> bool:
     return any(table.get("objects") in ([], ()) and not table.get("named") for table in tables)
 
 
+def described_trials(source: str, keys: Mapping[str, Any], called: Callable[[Any], str]) -> TrialSource:
+    """Return the source with these keys. Raises ConfigError, which calls a wrong key as its user does."""
+    try:
+        return structured({**keys, "source": source}, TrialSource, source)
+    except ValidationFailed as misfit:
+        problems = [f"{called(problem.path[0])}: {problem.words()}" for problem in misfit.problems]
+        raise ConfigError("\n".join(problems)) from None
+
+
 def load_trials(
     source: str = SIMULATED,
     *,
@@ -115,12 +124,7 @@ def load_trials(
 
     if names_no_object(keys):
         raise ConfigError(f"objects: {NO_OBJECT}")
-    try:
-        described = structured({**keys, "source": source}, TrialSource, source)
-    except ValidationFailed as misfit:
-        raise ConfigError(
-            "\n".join(f"{problem.path[0]}: {problem.words()}" for problem in misfit.problems)
-        ) from None
+    described = described_trials(source, keys, str)
     settings = cache(lambda: resolve(pipeline, options=options, flags=gripper_flags(source)))
     return without_copies(
         labelled_trials(

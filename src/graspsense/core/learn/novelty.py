@@ -162,6 +162,8 @@ def novelty_of(table: FeatureTable, labels: Sequence[str]) -> Novelty:
     values, given = table.values, np.array(labels)
     classes = tuple(sorted(set(labels)))
     lowest, highest = np.full((2, len(classes), len(table.names)), np.nan)
+    # Powers of two, which keep every digit: the square of a value below 1e-162 would be 0.
+    units = np.ldexp(1.0, np.frexp(np.nan_to_num(np.abs(values)).max(axis=0))[1] - 1)
     squares, freedom = np.zeros(len(table.names)), np.zeros(len(table.names), dtype=np.int64)
     for k, label in enumerate(classes):
         rows = values[given == label].T.copy()
@@ -170,9 +172,9 @@ def novelty_of(table: FeatureTable, labels: Sequence[str]) -> Novelty:
         have = trials > 0
         lowest[k, have], highest[k, have] = np.nanmin(rows[have], axis=1), np.nanmax(rows[have], axis=1)
         means = np.where(known, rows, 0.0).sum(axis=1) / np.maximum(trials, 1)
-        squares += np.where(known, (rows - means[:, np.newaxis]) ** 2, 0.0).sum(axis=1)
+        squares += np.where(known, ((rows.T - means) / units).T ** 2, 0.0).sum(axis=1)
         freedom += np.maximum(trials - 1, 0)
-    spread = np.sqrt(squares / np.maximum(freedom, 1))
+    spread = units * np.sqrt(squares / np.maximum(freedom, 1))
     for f in np.flatnonzero(freedom == 0).tolist():
         # With one trial in each class, the differences between classes are the only measure of spread.
         measured = values[~np.isnan(values[:, f]), f]

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 import unicodedata
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
 from pathlib import Path
 from typing import Final, Self
@@ -226,15 +226,14 @@ class CsvColumns:
 
     def table(self, names: Sequence[str]) -> FeatureTable:
         """Return these columns as a table of numbers. Raises ConfigError, DataDamaged."""
-        wanted = [self._nominal_value(name) for name in names]
-        known = _values_by_column(wanted)
-        values = np.array(
-            [
-                self.numbers(name) if column is None else self._is_value(*column, known[column[0]])
-                for name, column in zip(names, wanted, strict=True)
-            ],
-            dtype=np.float64,
-        ).T
+        known = self._known_values(names)
+        columns = [
+            self.numbers(name)
+            if (split := self._nominal_value(name)) is None
+            else self._is_value(*split, known)
+            for name in names
+        ]
+        values = np.array(columns, dtype=np.float64).T
         return FeatureTable(
             names=tuple(names),
             units=tuple(self.units.get(name, "") for name in names),
@@ -244,7 +243,7 @@ class CsvColumns:
     def unknown_values(self, names: Sequence[str]) -> list[str]:
         """Return notes on nominal columns that have other values than these names of features know."""
         notes = []
-        for column, known in _values_by_column([self._nominal_value(name) for name in names]).items():
+        for column, known in self._known_values(names).items():
             unknown = [text for text in self.texts(column) if text and text not in known]
             if unknown:
                 alike = alike_words(spelled_alike([*unknown, *known]))
@@ -261,13 +260,13 @@ class CsvColumns:
             return None
         return next((split for split in splits_of(name) if split[0] in self.cells), None)
 
-    def _is_value(self, column: str, value: str, known: set[str]) -> list[float]:
+    def _known_values(self, names: Sequence[str]) -> dict[str, set[str]]:
+        """Return the values of each nominal column that these names of features mean."""
+        known: dict[str, set[str]] = {}
+        for column, value in filter(None, map(self._nominal_value, names)):
+            known.setdefault(column, set()).add(value)
+        return known
+
+    def _is_value(self, column: str, value: str, known: Mapping[str, set[str]]) -> list[float]:
         """Return 1 where a nominal column has this value, NaN where it has none of those that are known."""
-        return [float(text == value) if text in known else math.nan for text in self.texts(column)]
-
-
-def _values_by_column(wanted: Sequence[tuple[str, str] | None]) -> dict[str, set[str]]:
-    known: dict[str, set[str]] = {}
-    for column, value in filter(None, wanted):
-        known.setdefault(column, set()).add(value)
-    return known
+        return [float(text == value) if text in known[column] else math.nan for text in self.texts(column)]

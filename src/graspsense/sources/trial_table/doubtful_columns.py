@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Hashable, Iterator, Mapping, Sequence
-from decimal import Decimal
-from itertools import groupby
+from decimal import Decimal, DecimalTuple
+from itertools import chain, groupby, permutations
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any, Final
 
@@ -18,16 +18,17 @@ import numpy as np
 from graspsense.core.components.caller import option
 from graspsense.core.learn.confounding import LEAST_LINES, says_the_label
 from graspsense.core.values.errors import counted, listed
-from graspsense.sources.columns.column_guess import words_of
+from graspsense.sources.columns.column_guess import TIME_WORDS, words_of
 from graspsense.sources.trial_table.identifiers import (
+    DIVISIONS,
     TIMES,
     are_even,
-    can_be_days,
     differs_by_label,
     follow_lines,
     groups_of_labels,
     in_one_block_each,
     is_count,
+    is_regular,
     is_time,
     name_objects,
     names_only,
@@ -40,23 +41,24 @@ if TYPE_CHECKING:
     from graspsense.sources.formats.csv_columns import CsvColumns
     from graspsense.sources.formats.table import Numbers
 
-_TIME_NAMES: Final = frozenset({
-    "t", "time", "elapsed", "clock", "hour", "hours", "minute", "minutes", "timestamp"
-})  # fmt: skip
+_TIME_NAMES: Final = TIME_WORDS | {"hour", "hours", "minute", "minutes"}
 _OF_TIMES: Final = TIMES | {
     "rec", "recorded", "recording", "start", "begin", "end", "at", "of", "day", "since", "total",
 }  # fmt: skip
 _OF_A_SESSION: Final = frozenset({
     "temperature", "temp", "humidity", "battery", "batt", "vbat", "baseline", "zero", "initial", "start", "before"
 })  # fmt: skip
+_CHANGES: Final = frozenset({
+    "slope", "stiffness", "rate", "rise", "drop", "change", "delta", "cooling", "crossing", "crossings",
+})  # fmt: skip
+"""What the contact alone shows, by the name of a column; in a unit such as N/m also without it."""
 _RESULTS: Final = frozenset({
     "svm", "knn", "nn", "mlp", "cnn", "rf", "lda", "classifier", "model", "output", "out", "margin", "loss", "residual",
     "decision", "result", "outcome", "votes", "pvalue", "pval",
 })  # fmt: skip
-_OF_RESULTS: Final = frozenset({"value", "val", "distance", "dist", "function", "rank"})
+_OF_RESULTS: Final = DIVISIONS | {"value", "val", "distance", "dist", "function", "rank"}
 """What a model or a test says, by the name of a column."""
-_TEMPERATURES: Final = frozenset({"C", "\u00b0C", "degC"})
-"""What can be the same, or drift, in a whole session; by the name of a column, or by its unit."""
+"""What can be the same, or drift, in a whole session, by the name of a column."""
 _OFTEN: Final = 3
 """Lines with the same value from which on it may stand for something else than a measurement."""
 _FROM_ZERO: Final = 0.15
@@ -78,6 +80,8 @@ _ROUNDED_SUM: Final = 0.02
 _ENOUGH_LINES: Final = 30
 _USUAL: Final = 2.0
 """Largest step between two labels over the median step within labels."""
+_STEADY: Final = 1.0
+"""Quartile range of the steps of what adds up over the trials, in any unit, over their median."""
 _THOUSAND: Final = 1000.0
 _GAP: Final = 100.0
 """Ratio of two neighbouring values between which the unit may change."""
@@ -89,8 +93,8 @@ _PROPORTIONAL: Final = 1.0 - 1e-6
 _DOUBTS: Final[Mapping[str, Mapping[str, str]]] = {
     "If it is the label or a prediction in other words, or a setting of the experiment, it reveals the labels: ": {
         "same": "all or most trials of each label have the same one of its few values",
-        "probabilities": "these are between 0 and 1, their sum is 1, and most trials of each label have the largest "
-        "one in one of them",
+        "probabilities": "their sum is the same in each line, and most trials of each label have the largest in one "
+        "of them",
         "result": "its name is that of the result of a model or a test, or has a label in it",
     },
     "If it tells when, how or with which object a trial was recorded, it reveals the labels: ": {
@@ -99,12 +103,10 @@ _DOUBTS: Final[Mapping[str, Mapping[str, str]]] = {
         "missing": "some labels have nearly all of its values, and others hardly any",
         "order": "its values follow the order of recording within each label, as a drifting zero, a battery or a clock "
         "does",
+        "time": "its name is that of a time",
         "session": "it is from before the contact, or can drift in a session, by its name or unit",
         "without a gap": "its values pass from label to label without a gap or an overlap, as those of a clock or a "
         "counter do",
-    },
-    "If it is the time of recording, it reveals the labels: name it as the order, or ": {
-        "time": "its name is that of a time, or its values can be dates as spreadsheets and MATLAB number them",
     },
     "Digits tell the labels: round all values alike, or ": {
         "digits": "it is written with fewer digits for some labels than for others",
@@ -135,11 +137,10 @@ def doubts(
     doubted: dict[str, list[str]] = {}
     for name in used if target is None else numbers:
         if target is not None:
-            reasons = [*_of_target(numbers[name], np.array(target.values)[lines])]
+            reasons = _of_target(numbers[name], np.array(target.values)[lines])
         else:
-            reasons = [*_of_recording(columns, name, labels)]
-            if name in numbers:
-                reasons += _of_numbers(name, columns.units[name], numbers[name], labels)
+            further = _of_numbers(name, columns.units[name], numbers[name], labels) if name in numbers else ()
+            reasons = chain(_of_recording(columns, name, labels), further)
         for reason in reasons:
             doubted.setdefault(reason, []).append(name)
     if target is None:
@@ -151,7 +152,7 @@ def doubts(
         for reason, what in shown.items()
         if doubted.get(reason)
     ]
-    return notes + _mixed(numbers) + list(_pads_apart(numbers))
+    return [*notes, *_mixed(numbers), *_pads_apart(numbers)]
 
 
 def _of_recording(columns: CsvColumns, name: str, labels: Sequence[str]) -> Iterator[str]:
@@ -177,13 +178,15 @@ def _of_numbers(name: str, unit: str, values: Numbers, labels: Sequence[str]) ->
     in_blocks = LEAST_LINES * sum(1 for _ in groupby(labels)) <= len(labels)
     if (differs or in_blocks) and follow_lines(values, labels):
         yield "order"
-    if of_time and (names_only(name, _TIME_NAMES, _OF_TIMES) or can_be_days(values)):
+    if of_time and names_only(name, _TIME_NAMES, _OF_TIMES):
         yield "time"
     if is_count(unit) and is_result(name, labels if differs else ()):
         yield "result"
-    if differs and (_OF_A_SESSION & set(words_of(name)) or unit in _TEMPERATURES):
+    words = set(words_of(name))
+    state = differs and "/" not in unit and not _CHANGES & words
+    if state and (_OF_A_SESSION & words or unit in ("C", "\u00b0C", "degC")):
         yield "session"
-    if of_time and passes_without_a_gap(values, labels):
+    if passes_without_a_gap(values, labels, np.inf if of_time else _STEADY):
         yield "without a gap"
     if digits_tell_labels(values, labels):
         yield "digits"
@@ -195,8 +198,11 @@ def _probabilities(numbers: dict[str, Numbers], labels: Sequence[str]) -> Iterat
     for begin in range(len(names) - n + 1):
         group = names[begin : begin + n]
         values = np.array([numbers[name] for name in group])
-        shares = n > 1 and (values >= 0.0).all() and (np.abs(values.sum(axis=0) - 1.0) <= _ROUNDED_SUM).all()
-        if shares and mostly_says_the_label(values.argmax(axis=0).tolist(), labels):
+        sums = (values if (values >= 0.0).all() else np.exp(values)).sum(axis=0)
+        # Of percentages and of votes, the sum is another number; logarithms are negative.
+        wholes = (float(np.median(sums)),) if (values == np.floor(values)).all() else (1.0, 100.0)
+        alike = any((np.abs(sums - whole) <= _ROUNDED_SUM * whole).all() for whole in wholes)
+        if n > 1 and alike and mostly_says_the_label(values.argmax(axis=0).tolist(), labels):
             yield from group
 
 
@@ -222,9 +228,9 @@ def mostly_says_the_label(values: Sequence[Hashable], labels: Sequence[str], sha
 
 
 def is_code(values: Sequence[Any], labels: Sequence[str]) -> bool:
-    """Return whether the values of each label are a whole number of its own with noise, and these follow each other."""
+    """Return whether the values of each label are a whole number with noise, and these numbers follow each other."""
     codes = np.round(values)
-    if np.ptp(codes) != len(set(labels)) - 1 or not says_the_label(codes.tolist(), labels):
+    if np.ptp(codes) != len(np.unique(codes)) - 1 or not says_the_label(codes.tolist(), labels):
         return False
     noise = [np.subtract(values, codes)[codes == code] for code in np.unique(codes)]
     return all(abs(part.mean()) * len(part) ** 0.5 <= _NEAR * part.std() for part in noise)
@@ -244,21 +250,19 @@ def digits_tell_labels(values: Numbers, labels: Sequence[str]) -> bool:
 
     Only digits that were rounded count, and not those of numbers of another magnitude.
     """
-    given: dict[str, list[float]] = {}
+    given: dict[str, list[DecimalTuple]] = {}
     for label, value in zip(labels, values.tolist(), strict=True):
-        given.setdefault(label, []).extend([value] if value == value else [])
-    written: dict[str, list[tuple[int, int]]] = {}
-    for label, numbers in given.items():
-        if len(numbers) >= LEAST_LINES and len(set(numbers)) >= _OFTEN:
-            decimals = [Decimal(repr(value)).normalize().as_tuple() for value in numbers]
-            written[label] = [(-int(number.exponent), len(number.digits)) for number in decimals]
-    most = {label: (max(all_of)[0], max(digits for _, digits in all_of)) for label, all_of in written.items()}
+        if value == value:
+            given.setdefault(label, []).append(Decimal(repr(value)).normalize().as_tuple())
+    places_and_digits = [
+        np.array([(-int(number.exponent), len(number.digits)) for number in numbers])
+        for numbers in given.values()
+        if len(numbers) >= LEAST_LINES and len(set(numbers)) >= _OFTEN
+    ]
     return any(
-        places < most[other][0]
-        and digits < min(most[other][1], _ROUNDED)
-        and 2 * sum(finer > places for finer, _ in all_of) > len(all_of)
-        for places, digits in most.values()
-        for other, all_of in written.items()
+        (coarse.max(axis=0) < np.minimum(fine.max(axis=0), (np.inf, _ROUNDED))).all()
+        and float((fine[:, 0] > coarse[:, 0].max()).mean()) > 0.5
+        for coarse, fine in permutations(places_and_digits, 2)
     )
 
 
@@ -283,10 +287,11 @@ def values_have_one_label(values: Sequence[str] | Sequence[float], labels: Seque
     return texts or ranges > among or are_even([*different.values()], _EVEN)
 
 
-def passes_without_a_gap(values: Numbers, labels: Sequence[str]) -> bool:
+def passes_without_a_gap(values: Numbers, labels: Sequence[str], uneven: float) -> bool:
     """Return whether each label has a range of its own, and no two ranges are farther apart than values within one.
 
-    Two classes of normally distributed values that do not overlap lie so closely in about 2 of 100 columns.
+    The quartile range of the steps is less than `uneven` times their median. Two classes of normally distributed values
+    that do not overlap lie so closely in about 2 of 100 columns.
     """
     known = np.flatnonzero(~np.isnan(values))
     order = known[np.argsort(values[known], kind="stable")]
@@ -296,7 +301,8 @@ def passes_without_a_gap(values: Numbers, labels: Sequence[str]) -> bool:
         return False
     steps = np.diff(values[order])
     usual = float(np.median(np.delete(steps, ends)))
-    return bool((steps[ends] > 0.0).all() and (steps[ends] <= _USUAL * usual).all())
+    touching = (steps[ends] > 0.0).all() and (steps[ends] <= _USUAL * usual).all()
+    return bool(touching) and is_regular(values[order], uneven)
 
 
 def follows_from(values: Numbers, target: Numbers) -> bool:
@@ -317,23 +323,21 @@ def follows_from(values: Numbers, target: Numbers) -> bool:
     return pairs == of_target and bool(rises) and len(set(values.tolist())) >= LEAST_LINES
 
 
-def _mixed(numbers: dict[str, Numbers]) -> list[str]:
-    """Return notes on columns in which a number stands for something else, or whose unit changes."""
-    notes = []
+def _mixed(numbers: dict[str, Numbers]) -> Iterator[str]:
+    """Yield notes on columns in which a number stands for something else, or whose unit changes."""
     for name, values in numbers.items():
         known = values[~np.isnan(values)]
         stand_in = stand_in_of(known)
         if stand_in is not None:
             times = int((known == stand_in).sum())
-            notes.append(
+            yield (
                 f"{name} is {stand_in:g} in {counted(times, 'trial')}, unlike all other values: if it stands for a "
                 "missing value, or a sensor had stopped or was at the end of its range, leave the cell empty"
             )
         elif unit_changes(known):
-            notes.append(
+            yield (
                 f"{name} has two groups of values, one a thousand times the other: make sure that all have one unit"
             )
-    return notes
 
 
 def _pads_apart(numbers: dict[str, Numbers]) -> Iterator[str]:

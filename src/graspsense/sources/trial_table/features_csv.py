@@ -9,7 +9,7 @@ from __future__ import annotations
 import fnmatch
 import math
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -78,7 +78,7 @@ def read_labelled(
 
     Raises ConfigError if a column does not exist or cannot be a label, DataDamaged if the file is not a valid table.
     """
-    columns, export, label = _opened(path, label, {instance or "instance", order})
+    columns, export, label = _opened(path, label, instance, order)
     notes = list(columns.notes)
     if export is not None:
         export.keep_complete_trials(label if value is None else None, notes)
@@ -100,7 +100,7 @@ def read_labelled(
         recorded = lines if ranks is None else sorted(lines, key=ranks.__getitem__)
         notes += [] if order is not None else [_no_order(columns, reserved, identified)]
         notes += doubts(columns, labels, table, target, recorded)
-        notes += map(_not_held_out, _sessions(columns, others, instances))
+        notes += _not_held_out(_sessions(columns, others, instances))
     return Labelled(
         source=str(path),
         table=table,
@@ -118,21 +118,28 @@ def read_labelled(
     )
 
 
-def _not_held_out(name: str) -> str:
-    return (
-        f"not held out: trials of one {name} are in training and test data. If it matters, a further {name} is "
-        f"recognised less often than told; {option('instance', name)} holds it out"
-    )
+def _not_held_out(names: Iterable[str]) -> Iterator[str]:
+    for name in names:
+        yield (
+            f"not held out: trials of one {name} are in training and test data. If it matters, a further {name} is "
+            f"recognised less often than told; {option('instance', name)} holds it out"
+        )
 
 
 def _opened(
-    path: Path, label: str | None, others: set[str | None]
+    path: Path, label: str | None, instance: str | None, order: str | None
 ) -> tuple[CsvColumns, ExportedTable | None, str | None]:
-    """Return the columns of a file, the same if they were exported, and the label; `others` are no features."""
+    """Return the columns of a file, the same if they were exported, and the label. Raises ConfigError, DataDamaged."""
     columns = columns_of_file(path)
     export = exported(columns)
     label = label or columns.default_label or ("label" if export is not None else None)
-    columns.take_words_as_missing([name for name in columns.names if name not in {label, *others}])
+    if label is not None and label in {instance, order}:
+        raise ConfigError(
+            f"{label!r} is the label: {option('instance', 'COLUMN')} names another column, which tells its objects "
+            f"apart, and {option('order', 'COLUMN')} that of the order of recording"
+        )
+    no_features = {label, instance or "instance", order}
+    columns.take_words_as_missing([name for name in columns.names if name not in no_features])
     return columns, export, label
 
 
@@ -400,11 +407,12 @@ def _feature_names(
 
 def _note_uninformative_columns(path: Path, table: FeatureTable, notes: list[str]) -> None:
     """Note which features have no value or a single value. Raises DataDamaged if none has any."""
-    named = list(zip(table.names, table.values.T, strict=True))
-    blank = [name for name, values in named if np.isnan(values).all()]
-    having = [(name, values[~np.isnan(values)]) for name, values in named]
-    same = [(name, values) for name, values in having if len(values) and _span(values) == 0.0]
-    constant = [name for name, values in same if values.any() or not splits_of(name)]
+    given = {
+        name: column[~np.isnan(column)] for name, column in zip(table.names, table.values.T, strict=True)
+    }
+    blank = [name for name, values in given.items() if not len(values)]
+    same = {name: values for name, values in given.items() if len(values) and _span(values) == 0.0}
+    constant = [name for name, values in same.items() if values.any() or not splits_of(name)]
     if blank:
         notes.append(f"without any value: {listed(blank)}")
     if constant:

@@ -40,14 +40,15 @@ _NAMES: Final = frozenset({
     "epoch", "nummer", "versuch", "messung", "zeile", "datei", "sitzung", "datum", "zeit", "uhrzeit", "essai",
     "fichier", "heure", "numero", "prueba", "archivo", "fecha", "hora"
 })  # fmt: skip
-_DIVISIONS: Final = frozenset({
+DIVISIONS: Final = frozenset({
     "seed", "trial", "fold", "kfold", "split", "is", "train", "training", "test", "testing", "validation",
     "holdout", "subset", "partition", "rep", "repeat", "repetition", "replicate", "attempt", "try", "take", "iteration",
-    "random", "uid", "uuid", "crc", "checksum", "chk", "hash", "sha", "pred", "prediction", "predicted", "proba",
-    "probability", "confidence", "certainty", "score", "logit", "likelihood", "yhat", "hat", "cluster", "correct",
+    "random", "uid", "uuid", "crc", "checksum", "chk", "hash", "sha", "pred", "prediction", "predicted", "prob",
+    "probs", "proba", "probability", "softmax", "posterior", "confidence", "certainty", "score", "logit", "likelihood",
+    "yhat", "hat", "cluster", "correct",
 })  # fmt: skip
 """What trials are told apart and divided by, and what a model said of them."""
-_OF_RECORDINGS: Final = _DIVISIONS | {
+_OF_RECORDINGS: Final = DIVISIONS | {
     "session", "operator", "experimenter", "person", "participant", "subject", "user", "robot", "host", "lab", "site",
     "batch", "lot", "block", "series", "group", "round", "run", "cycle", "weekday", "day", "doy", "week", "month",
     "year", "date", "datetime", "file", "filename", "sitzung", "bediener", "proband", "datum", "wochentag", "tag",
@@ -84,10 +85,15 @@ _HASHED: Final = 1e7
 """Integers from this one on are hashes, if they number objects and are no multiples of 1000."""
 _EPOCH_S: Final = (6.3e8, 4.2e9)
 """The years 1990 to 2100 in seconds since 1970."""
-_PER_SECOND: Final = (1.0, 1e3, 1e6, 1e9)
-"""The units of such times."""
-_LONGEST_S: Final = 3.2e8
-"""Ten years, in which the trials of a table were recorded."""
+_DAY_S: Final = 86_400.0
+_CALENDARS: Final = (
+    *((1.0 / per_second, 0.0) for per_second in (1.0, 1e3, 1e6, 1e9)),
+    *((_DAY_S, day_of_1970) for day_of_1970 in (25_569.0, 40_587.0, 719_529.0, 2_440_587.5)),
+)
+"""The unit (s) of such times, and the year 1970 in it: in seconds and their parts, and in the days of spreadsheets, of
+Julian dates, modified or not, and of MATLAB."""
+_WORKING_DAY: Final = 0.7
+"""Part of the day in which all recordings were made."""
 NAME_OBJECTS: Final = "name the objects (say so by --instance)"
 NUMBER_OBJECTS: Final = "number the objects (name them by --instance)"
 NAME_THINGS: Final = "name the objects, which have several labels (say so by --instance)"
@@ -112,10 +118,6 @@ _DATES: Final = (*_DAY_FORMS, "%y%m%d%H%M", "%Y%m%d%H%M", "%y%m%d%H%M%S", "%Y%m%
 _CLOCK_VALUES: Final = (10, 15)
 """Different hundreds, and different last two digits, from which on 142530 and 91205 are times of the day: that no two
 digits are above 59 is a chance of one in two thousand."""
-_DAYS: Final = ((36_526.0, 69_807.0), (730_486.0, 749_113.0))
-"""The years 2000 to 2050 in days, as spreadsheets or the modified Julian date, and as MATLAB count them."""
-_WORKING_DAY: Final = 0.7
-"""Part of the day in which all recordings were made."""
 
 
 def names_a_recording(name: str) -> bool:
@@ -141,7 +143,7 @@ def groups_trials(name: str, values: Sequence[str], instances: Sequence[str] | N
     counts = Counter(filter(None, values))
     pairs = {pair for pair in zip(values, instances or range(len(values)), strict=True) if pair[0]}
     several = len(pairs) > len(counts) > 1 and min(counts.values()) > 1
-    return several and names_a_recording(name) and not _DIVISIONS & set(words_of(name))
+    return several and names_a_recording(name) and not DIVISIONS & set(words_of(name))
 
 
 def identifies(
@@ -182,16 +184,14 @@ def identifies(
         turns = 2 * blocks > len(known) and differs_by_label(column, known)
         counts = len(values_of) >= _COUNTING and way >= 1.0 - _TIES and not turns
         follows = different and (way == 1.0 or in_labels)
-        like_clock = _is_regular(values_of) or (is_time(unit) and in_labels)
+        like_clock = is_regular(values_of) or (is_time(unit) and in_labels)
         if ((whole or named) and (counts or follows)) or (follows and like_clock):
             return "follow the order of the lines as a counter or a time does"
-    if different:
-        if _hardly_repeats(len(column), len(values_of), cells) or (
-            named and whole and len(values_of) == len(column)
-        ):
-            return "number the trials"
-        if len(values_of) == len(column) >= _SPACED and _is_regular(values_of, _ALIKE):
-            return "have equal steps, as those of a clock or a counter"
+    no_ties = len(values_of) == len(column)
+    if different and (_hardly_repeats(len(column), len(values_of), cells) or (named and whole and no_ties)):
+        return "number the trials"
+    if no_ties and len(column) >= _SPACED and is_regular(values_of, _ALIKE):
+        return "have equal steps, as those of a clock or a counter"
     return ""
 
 
@@ -214,13 +214,12 @@ def text_identifies(texts: Sequence[str], labels: Sequence[str]) -> str:
     numbered = all(re.search(r"\d", text) for text in counts)
     hardly = len(counts) > max(2, len(given) * _MOST_VALUES)
     for known, why in ((own, NAME_OBJECTS), (groups_of_labels(values, own), NAME_THINGS)):
-        if name_objects(values, known):
+        of_one_label = len(set(zip(values, known, strict=True))) == len(counts)
+        several = numbered and not hardly and _enough_objects(len(counts), known)
+        if name_objects(values, known) or (several and of_one_label):
             return why
         if hardly:
             return "are texts that hardly repeat, as names of trials, files and remarks do"
-        pairs = len(set(zip(values, known, strict=True)))
-        if numbered and _enough_objects(len(counts), known) and pairs == len(counts):
-            return why
     return ""
 
 
@@ -236,24 +235,31 @@ def is_time(unit: str) -> bool:
 
 def _is_calendar(column: NDArray[np.float64]) -> bool:
     """Return whether these are times since 1970, or dates written as 20261126."""
-    least, most, distinct = float(column.min()), float(column.max()), len(np.unique(column))
-    low, high = _EPOCH_S
-    # No two grasps are recorded within a second.
-    if distinct > len(column) / 2 and any(
-        low * unit <= least
-        and most <= high * unit
-        and (distinct - 1) * unit <= most - least <= _LONGEST_S * unit
-        for unit in _PER_SECOND
-    ):
+    values = np.unique(column)
+    if 2 * len(values) > len(column) and any(_is_time_in(values, *calendar) for calendar in _CALENDARS):
         return True
-    if least < 0.0 or (column != np.floor(column)).any():
+    if values[0] < 0.0 or (values != np.floor(values)).any():
         return False
-    texts = [f"{value:.0f}" for value in np.unique(column).tolist()]
+    texts = [f"{value:.0f}" for value in values.tolist()]
     if any(all(_is_written_date(text, form) for text in texts) for form in _DATES):
         return True
-    hundreds, ends = np.unique(column // 100.0), np.unique(column % 100.0)
+    hundreds, ends = np.unique(values // 100.0), np.unique(values % 100.0)
     many = len(hundreds) >= _CLOCK_VALUES[0] and len(ends) >= _CLOCK_VALUES[1]
-    return many and most < 240_000.0 and max(ends.max(), (hundreds % 100.0).max()) < 60.0
+    return many and values[-1] < 240_000.0 and max(ends.max(), (hundreds % 100.0).max()) < 60.0
+
+
+def _is_time_in(values: NDArray[np.float64], unit_s: float, year_1970: float) -> bool:
+    """Return whether different rising values are times in a calendar: most of them come after another within two days.
+
+    No two grasps are recorded within a second, and all that are numbered by days in a working day.
+    """
+    low, high = _EPOCH_S
+    times_s = unit_s * (values - year_1970)
+    steps_s = np.diff(times_s)
+    within = steps_s.mean() >= 1.0 and np.median(steps_s) <= 2.0 * _DAY_S
+    parts = np.unique((values - year_1970) % 1.0)
+    in_day = unit_s < _DAY_S or (2 * len(parts) > len(values) and np.ptp(parts) < _WORKING_DAY)
+    return bool(low <= times_s[0] and times_s[-1] <= high and within and in_day)
 
 
 def _is_written_date(text: str, form: str) -> bool:
@@ -263,14 +269,6 @@ def _is_written_date(text: str, form: str) -> bool:
         return len(text) == digits and 1970 <= datetime.strptime(text, form).year <= 2100
     except ValueError:
         return False
-
-
-def can_be_days(values: NDArray[np.float64]) -> bool:
-    """Return whether these can be days and parts of days, as spreadsheets and MATLAB number them."""
-    known = values[~np.isnan(values)]
-    if len(known) < LEAST_LINES or not 0.0 < np.ptp(known % 1.0) < _WORKING_DAY:
-        return False
-    return any(low <= known.min() and known.max() <= high for low, high in _DAYS)
 
 
 def one_way(values: NDArray[np.float64]) -> float:
@@ -339,7 +337,7 @@ def differs_by_label(values: NDArray[np.float64], labels: Sequence[str]) -> bool
     return bool(np.var(values[known] - means[codes]) < 0.5 * np.var(values[known]))
 
 
-def _is_regular(values: NDArray[np.float64], most: float = _IRREGULAR) -> bool:
+def is_regular(values: NDArray[np.float64], most: float = _IRREGULAR) -> bool:
     """Return whether the steps between these rising values are alike, as those of a clock are."""
     low, middle, high = np.quantile(np.diff(values), (0.25, 0.5, 0.75))
     return bool(high - low < most * middle)
@@ -387,8 +385,7 @@ def groups_of_labels(values: Sequence[Hashable], labels: Sequence[str]) -> list[
     label_of: dict[Hashable, str] = {}
     for value, label in dict.fromkeys(zip(values, labels, strict=True)):
         kept, joined = group[label_of.setdefault(value, label)], group[label]
-        if kept != joined:
-            group = {name: kept if head == joined else head for name, head in group.items()}
+        group = {name: kept if head == joined else head for name, head in group.items()}
     several = Counter(group[label] for label in label_of.values())
     apart = len(several) > 1 and min(several.values()) > 1
     return [group[label] if apart else label for label in labels]
