@@ -8,7 +8,7 @@ from traces import made_recording
 
 from graspsense.core.control.contact import CONTACT_FORCE_N, REST_SPEED_M_S, REST_WINDOW_S, first_rest
 from graspsense.core.values.features import Features
-from graspsense.sources.importing.import_outcomes import presses_on
+from graspsense.sources.recordings.doubtful_rests import presses_on
 from graspsense.sources.recordings.noise_thresholds import thresholds_for
 
 

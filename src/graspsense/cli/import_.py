@@ -281,7 +281,7 @@ def _import(
             say(f"  {note}")
     if stored.kept:
         say(f"  {chosen.words}")
-        _echo_notices(_summary(recordings), ends.notice, err=values_alone())
+        _echo_notices(_summary(recordings), ends.notices, err=values_alone())
     if again := [trial for trial in stored.kept if "earlier" in trial]:
         known = f"{again[0]['source']} is that of trial {again[0]['earlier']}"
         say(
@@ -378,7 +378,7 @@ def _show(
             "unreadable": [recording.line for recording in unreadable],
             "thresholds": chosen.words,
             "outcomes": ends,
-            "rests": tries.notice,
+            "rests": "; ".join(tries.notices),
         }
     )
     _echo_summary(summary)
@@ -386,7 +386,7 @@ def _show(
     echo_entry("thresholds", chosen.words.partition(": ")[2])
     some = "" if outcomes.total() == len(recordings) else f" (of {outcomes.total()} that were tried)"
     echo_entry("outcomes", ", ".join(f"{count} {words}" for words, count in ends.items()) + some)
-    _echo_notices(summary, tries.notice, err=False)
+    _echo_notices(summary, tries.notices, err=False)
     middle = recordings[len(recordings) // 2]
     try:
         with readable(middle.labelled.source), handed_over(middle.name, middle.labelled.recording):
@@ -436,7 +436,7 @@ def _span(values: Sequence[float]) -> str:
     return low if low == high else f"{low} to {high}"
 
 
-def _echo_notices(summary: ImportSummary, of_rests: str, *, err: bool) -> None:
+def _echo_notices(summary: ImportSummary, of_rests: Sequence[str], *, err: bool) -> None:
     """Print what looks wrong; of what differs in its numbers alone, the most frequent one as an example."""
     kinds: dict[str, Counter[str]] = {}
     for notice, count in summary.notices:
@@ -446,5 +446,5 @@ def _echo_notices(summary: ImportSummary, of_rests: str, *, err: bool) -> None:
         f"{', for example' if len(alike) > 1 else ''}: {next(iter(alike))}"
         for alike in kinds.values()
     ]
-    for notice in [*notices, *filter(None, [of_rests])]:
+    for notice in [*notices, *of_rests]:
         echo(f"  {notice}", Style.CAUTION, indent=2, err=err)
