@@ -11,7 +11,7 @@ import click
 from graspsense.cli.options import force_option, keys_option, pipeline_option, plot_option
 from graspsense.cli.output import echo_values, json_option
 from graspsense.cli.run import draw_grasp, print_trial
-from graspsense.cli.terminal import talk
+from graspsense.cli.terminal import talk, warn
 from graspsense.core.components.registry import installed
 from graspsense.core.pipeline.wiring import check
 from graspsense.core.settings.layers import Flag
@@ -19,6 +19,7 @@ from graspsense.core.settings.resolved import Settings, resolve
 from graspsense.core.values.trial import trial_as_json
 
 if TYPE_CHECKING:
+    from graspsense.core.values.trial import Trial
     from graspsense.sources.recordings.noise_thresholds import Thresholds
 
 
@@ -49,8 +50,20 @@ def replay(
     trial = grasp_with(settings, installed())
     echo_values(trial_as_json(trial))
     print_trial(trial)
+    _warn_of_rest(trial)
     if plot is not None:
         draw_grasp(trial, Path(plot))
+
+
+def _warn_of_rest(trial: Trial) -> None:
+    """Warn where most of the squeeze of a recording of others comes after the rest of this trial."""
+    from graspsense.sources.recordings.doubtful_rests import notices_of_rests
+    from graspsense.sources.recordings.replay import kind_and_name, read_named
+
+    kind, name = kind_and_name(trial.run.settings["gripper"]["recording"])
+    if kind not in ("store", "mcap"):
+        for notice in notices_of_rests([(trial.features, read_named(kind, name))], "controller"):
+            warn(notice)
 
 
 def _settings(recording: str, pipeline: str | None, options: tuple[str, ...], force: bool) -> Settings:

@@ -96,14 +96,11 @@ def samples(manifest: ReadManifest, table: ColumnTable) -> GraspColumns:
         lines=table.lines,
         events=events,
     )
-    whole = columns if keys.split == "force" and _is_mostly_known(columns) else without_missing(columns)
-    return without_duplicates(whole) if keys.duplicates == "drop" else whole
-
-
-def _is_mostly_known(columns: GraspColumns) -> bool:
-    """Return whether gap and forces were measured together: what is missing in a squeeze is then of that squeeze."""
     known = np.isfinite(columns.gap_m + columns.force_n)
-    return bool(np.isfinite(columns.t_s).all() and known.mean() > MOSTLY)
+    # What is missing in a squeeze is of that squeeze, if gap and forces were measured together.
+    divided = keys.split == "force" and np.isfinite(t_s).all() and known.mean() > MOSTLY
+    whole = columns if divided else without_missing(columns)
+    return without_duplicates(whole) if keys.duplicates == "drop" else whole
 
 
 def _sides(columns: AvailableColumns) -> tuple[Numbers, Numbers, str]:

@@ -164,11 +164,6 @@ def _first_frame(grasps: list[IcubGrasp]) -> FeatureTable:
     joints = [f"joint_{FIRST_JOINT + k}" for k in range(9)]
     maxima = [f"{finger}_maximum" for finger in FINGERS]
     taxels = [f"{finger}_{k + 1}" for finger in FINGERS for k in range(12)]
-    values = np.array(
-        [
-            np.concatenate((grasp.encoders_deg[0], grasp.maxima[0], grasp.taxels[0].ravel()))
-            for grasp in grasps
-        ]
-    )
+    numbers = [(*grasp.encoders_deg[0], *grasp.maxima[0], *grasp.taxels[0].ravel()) for grasp in grasps]
     names = (*joints, *maxima, *taxels)
-    return FeatureTable(names=names, units=("deg",) * 9 + ("counts",) * 65, values=values)
+    return FeatureTable(names=names, units=("deg",) * 9 + ("counts",) * 65, values=np.array(numbers))
