@@ -19,7 +19,6 @@ from graspsense.core.settings.resolved import Settings, resolve
 from graspsense.core.values.trial import trial_as_json
 
 if TYPE_CHECKING:
-    from graspsense.core.values.trial import Trial
     from graspsense.sources.recordings.noise_thresholds import Thresholds
 
 
@@ -44,26 +43,20 @@ def replay(
     file, thresholds of contact and rest that are not set are those that `import` would choose.
     """
     from graspsense.core.pipeline.pipeline import grasp_with
+    from graspsense.sources.recordings.doubtful_rests import notices_of_rests
+    from graspsense.sources.recordings.replay import kind_and_name, read_named
 
     settings = _settings(recording, pipeline, options, force)
     check(settings)
     trial = grasp_with(settings, installed())
     echo_values(trial_as_json(trial))
     print_trial(trial)
-    _warn_of_rest(trial)
-    if plot is not None:
-        draw_grasp(trial, Path(plot))
-
-
-def _warn_of_rest(trial: Trial) -> None:
-    """Warn where most of the squeeze of a recording of others comes after the rest of this trial."""
-    from graspsense.sources.recordings.doubtful_rests import notices_of_rests
-    from graspsense.sources.recordings.replay import kind_and_name, read_named
-
-    kind, name = kind_and_name(trial.run.settings["gripper"]["recording"])
+    kind, name = kind_and_name(settings.values["gripper"]["recording"])
     if kind not in ("store", "mcap"):
         for notice in notices_of_rests([(trial.features, read_named(kind, name))], "controller"):
             warn(notice)
+    if plot is not None:
+        draw_grasp(trial, Path(plot))
 
 
 def _settings(recording: str, pipeline: str | None, options: tuple[str, ...], force: bool) -> Settings:

@@ -400,13 +400,13 @@ def _twice(force: _Force) -> Iterator[str]:
     pairs = np.column_stack((force.gap, force.n))
     new = np.flatnonzero((np.diff(pairs, axis=0) != 0.0).any(axis=1)) + 1
     same = np.unique(pairs[new], axis=0, return_inverse=True)[1].ravel()
-    order, since = np.argsort(same, kind="stable"), np.zeros(len(new), dtype=np.int64)
+    order, since = np.argsort(same, kind="stable"), np.zeros(len(new))
     since[order[1:]] = np.diff(order) * (np.diff(same[order]) == 0)
     for begin, end in _runs(since) if len(new) else ():
         block = new[begin:end]
         if min(since[begin], len(block)) >= LINE and np.ptp(force.n[block]) > PART * force.span:
             yield (
-                f"the samples from {force.t[new[begin - since[begin]]]:.4g} s on come again at "
+                f"the samples from {force.t[new[begin - int(since[begin])]]:.4g} s on come again at "
                 f"{force.when(block[0])}, {len(block)} of them: were lines written twice? All later times are then too "
                 "late"
             )

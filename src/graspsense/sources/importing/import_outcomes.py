@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from attrs import frozen
 
 from graspsense.core.components.caller import set_option
 from graspsense.core.components.registry import installed
@@ -27,30 +26,22 @@ FEWEST: Final = 4
 """Number of recordings from which on most of them are not a coincidence."""
 
 
-@frozen
-class TriedRecordings:
-    """How many of the recordings that were tried end in which way, and what looks wrong in their rests."""
-
-    outcomes: Counter[Outcome]
-    notices: list[str]
-
-
 def tried(
-    recordings: Sequence[ImportedRecording], settings_of: Callable[[ImportedRecording], Settings]
-) -> TriedRecordings:
-    """Return how some recordings, evenly spread, end."""
+    recordings: Sequence[ImportedRecording], settings_of: Callable[[str], Settings]
+) -> tuple[Counter[Outcome], list[str]]:
+    """Return how many of some recordings, evenly spread, end in which way, and what looks wrong in their rests."""
     outcomes: Counter[Outcome] = Counter()
     grasps = []
     for imported in recordings[:: -(-len(recordings) // MOST)]:
         recording = imported.labelled.recording
         with handed_over(imported.name, recording):
             try:
-                trial = grasp_with(settings_of(imported), installed())
+                trial = grasp_with(settings_of(imported.name), installed())
             except GraspsenseError:  # which the import itself reports
                 continue
         outcomes[trial.outcome] += 1
         grasps.append((trial.features, recording))
-    return TriedRecordings(outcomes, notices_of_rests(grasps, "controller"))
+    return outcomes, notices_of_rests(grasps, "controller")
 
 
 def refuse_useless(

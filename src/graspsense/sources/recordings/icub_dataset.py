@@ -137,11 +137,8 @@ def _grasps(folder: str) -> list[GraspFile]:
     place = within if within.is_dir() else given
     if not place.is_dir():
         raise ConfigError(f"there is no folder {given}: name the folder of the iCub Grasp Dataset")
-    grasps = []
-    for path in place.glob("*.txt"):
-        match = _FILE.fullmatch(path.name)
-        if match:
-            grasps.append((path, match["label"], int(match["number"])))
+    matches = [(path, _FILE.fullmatch(path.name)) for path in place.glob("*.txt")]
+    grasps = [(path, match["label"], int(match["number"])) for path, match in matches if match]
     if not grasps:
         raise ConfigError(f"{place} contains no file of the iCub Grasp Dataset (CLASS_NUMBER.txt)")
     return sorted(grasps, key=itemgetter(1, 2))
