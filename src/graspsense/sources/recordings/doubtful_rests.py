@@ -66,7 +66,7 @@ def rests_within_a_step(features: Features, recording: Recording) -> bool:
     Fingers that slow down are then still within the next step for as long as that.
     """
     known = dict(zip(features.names, features.values, strict=True))
-    delta_t, p_steady = known.get("delta_t", math.nan), known.get("p_steady", math.nan)
+    delta_t, p_steady = (known.get(name, math.nan) for name in ("delta_t", "p_steady"))
     t_s, gap = recording.columns("t_s", "gap_m")
     reached = gap <= p_steady
     if not (delta_t >= 0.0 and reached.any()) or {"t", "gap"} & recording.units.keys():
