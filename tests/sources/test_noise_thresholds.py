@@ -8,7 +8,7 @@ from traces import made_recording
 
 from graspsense.core.control.contact import CONTACT_FORCE_N, REST_SPEED_M_S, REST_WINDOW_S, first_rest
 from graspsense.core.values.features import Features
-from graspsense.sources.recordings.doubtful_rests import presses_on
+from graspsense.sources.recordings.doubtful_rests import notices_of_rests
 from graspsense.sources.recordings.noise_thresholds import thresholds_for
 
 
@@ -256,4 +256,4 @@ def test_a_rest_before_most_of_the_force_is_doubted_also_where_the_gap_shows_no_
 ):
     values = (0.064, rest_mm / 1e3, rest_n)
     features = Features(names=("p_first", "p_steady", "f_steady"), values=values, units=("m", "m", "N"))
-    assert presses_on(features, recording) is goes_on
+    assert bool(notices_of_rests([(features, recording)], "features")) is goes_on

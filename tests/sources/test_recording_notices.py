@@ -88,6 +88,7 @@ HELD = slice(0, 260)
 # One that reads a fifth less is sound by itself, so only the step tells that the pads are exchanged.
 LOW_N = 0.8 * (RELEASED_N - NOISE_N[0]) + NOISE_N[1]
 LINE_N = np.interp(T_S, [0.8, 1.5], [0.0, 3.0])
+TWICE = np.concatenate((np.arange(160), np.arange(110, 300)))
 # As where samples without a time of their own are missing.
 CUT = (T_S < 1.5) | (T_S >= 1.7)
 
@@ -143,6 +144,11 @@ TOLD = {
     "values that stay for the contact": (
         "repeats one value from 0.9 to 1.06 s", spoilt(90, np.full(17, LEFT[90])), None, OPEN_AGAIN_M
     ),
+    "fingers that are elsewhere at the next of 20 samples a second": (
+        "jumps by 18 mm within 50 ms", RELEASED_N[::5], None,
+        np.where((T_S >= 0.3) & (T_S < 0.9), OPEN_AGAIN_M[30], OPEN_AGAIN_M)[::5] + NOISE_N[1, ::5] / 5e3, 20.0,
+    ),
+    "lines that were written twice": ("from 1.1 s on come again", RELEASED_N[TWICE], None, SOFT_M[TWICE]),
     # 6 N/s for 0.2 s.
     "a force that rises at once": ("rises by 1.2", RELEASED_N[CUT], None, OPEN_AGAIN_M[CUT]),
 }  # fmt: skip

@@ -163,13 +163,13 @@ def signal_notices(recording: Recording) -> Iterator[str]:
             told += [*_glitches(force), *_seldom(force.what, force.t, force.n, FREE)]
             told += [] if doubtful else _rough(force)
         told += _drift(force)
+    told += _twice(mean)
     told = told or [*_rises_at_once(mean), *_falls_at_once(mean)]
     if not {"gap", "t"} & recording.units.keys():
         told += _bump(mean)
         gap_mm = evolve(mean, what="the gap", n=1e3 * mean.gap, units={"force_left": "mm"})
         told += [*_glitches(gap_mm), *_filled(gap_mm)] or _gap_leaps(mean.t, mean.gap)
         told += _stopped_gap(mean)
-    told += _twice(mean)
     if "t" not in recording.units:
         told += next(filter(None, (list(_late(force, doubtful=bool(told))) for force in forces)), ())
     yield from told
