@@ -242,10 +242,8 @@ RIGID = reframed(SQUEEZED, lambda frame: {"gap_m": frame.gap_m - (23 / 24) * min
     [
         # The squeeze closes from 64 to 61.6 mm with up to 8 N, or stays at 64 mm.
         (STUCK, 64.0, 3.6, True),
-        (STUCK, 64.0, 7.5, False),
         (SQUEEZED, 63.0, 3.6, True),
         (SQUEEZED, 61.7, 3.6, False),
-        (SQUEEZED, 61.6, 7.9, False),
         (SQUEEZED, 61.6, 0.1, True),  # the force is gone, and the fingers have not opened
         (RIGID, 63.9, 5.0, True),
         (RIGID, 63.9, 7.5, False),
