@@ -96,11 +96,14 @@ def samples(manifest: ReadManifest, table: ColumnTable) -> GraspColumns:
         lines=table.lines,
         events=events,
     )
-    known = np.isfinite(columns.gap_m + columns.force_n)
-    # What is missing in a squeeze is of that squeeze, if gap and forces were measured together.
-    divided = keys.split == "force" and np.isfinite(t_s).all() and known.mean() > MOSTLY
-    whole = columns if divided else without_missing(columns)
+    whole = columns if keys.split == "force" and _is_mostly_known(columns) else without_missing(columns)
     return without_duplicates(whole) if keys.duplicates == "drop" else whole
+
+
+def _is_mostly_known(columns: GraspColumns) -> bool:
+    """Return whether gap and forces were measured together: what is missing in a squeeze is then of that squeeze."""
+    known = np.isfinite(columns.gap_m + columns.force_n)
+    return bool(np.isfinite(columns.t_s).all() and known.mean() > MOSTLY)
 
 
 def _sides(columns: AvailableColumns) -> tuple[Numbers, Numbers, str]:
