@@ -11,6 +11,7 @@ from commands import graspsense, printed
 from recorded_files import write_topics
 from repository import ROOT
 
+from graspsense import load_trials
 from graspsense.sources.columns.channel_facts import channel_facts
 from graspsense.sources.manifest.reader import read_recordings
 
@@ -91,8 +92,11 @@ def rests_of(folder, *points, step_mm=0.0):
 def test_a_rest_after_which_the_squeeze_goes_on_is_told(tmp_path):
     """The fingers stick for 0.6 s, at a sixth of the force that the squeeze comes to."""
     stuck = rests_of(tmp_path / "stuck", (0, 80), (1, 50), (1.4, 49.2), (2, 49.2), (4, 45), (8, 45))
-    assert stuck.startswith("1 of 1 grasp tried")
+    assert stuck.startswith("1 of 1 grasp:")
     assert "controller.rest_window_s" in stuck
+    place = f"manifest:{tmp_path / 'stuck' / 'm.toml'}"
+    assert any("features.rest_window_s" in note for note in load_trials(place).notes)
+    assert "controller.rest_window_s" in graspsense("replay", f"{place}#1").stderr
     assert rests_of(tmp_path / "resting", (0, 80), (1, 50), (4, 45), (8, 45)) == ""
 
 
@@ -161,7 +165,7 @@ def test_the_cells_of_sensors_are_forces_whatever_their_names(names: str, tmp_pa
     ("head", "recorded", "label"),
     [
         ("# date: 2026-05-03 14:22:01\n# object: jar\n", "{date}", "jar"),
-        ("# Date: 2026-05-03\n# Time: 14:22:01\n", "{date} {time}", "object"),
+        ("# Date: 3.5.2026\n# Time: 14:22:01\n", "{date} {time}", "object"),
         ('"Started"\t"2026-05-03T14:22:01"\n\n', "{started}", "object"),
         ("# rate: 100 Hz\n# operator = Ada\n", None, "object"),
     ],

@@ -388,15 +388,15 @@ def test_a_force_that_falls_on_closing_is_not_divided_into_squeezes_of_free_fing
 
 def test_files_with_a_text_where_a_pattern_wants_digits_are_told(tmp_path):
     gap, force = squeezing()
-    for name in ("can_1", "can_2", "can_x", "notes", "can_list"):
+    for name in ("can_1", "can_2", "can_x", "notes", "can_1_pads", "can_2_pads"):
         pandas_csv(tmp_path / f"{name}.csv", {"t": T_S, "gap": gap * 1e3, "F": force})
-    text = PLAIN.replace("{label}", "{label}_{order:d}") + 'beside = "can_list.csv"\n'
+    text = PLAIN.replace("{label}", "{label}_{order:d}") + 'beside = "{label}_{order}_pads.csv"\n'
     told = [
         notice for grasp in recordings(tmp_path, text) for notice in grasp.notices if "not used" in notice
     ]
     assert len(told) == 1
     assert "can_x.csv" in told[0]
-    assert "can_list" not in told[0]
+    assert "pads" not in told[0]
     assert "notes" not in told[0]
 
 
@@ -461,7 +461,7 @@ def test_a_list_names_files_and_rows_with_their_facts(tmp_path):
     pandas_csv(tmp_path / "all.csv", {"gap": np.tile(gap, 2), "F": np.tile(force, 2)})
     (tmp_path / "list.csv").write_text(
         "file,label,instance,recorded,order,first_row,last_row\n"
-        "all.csv,jar:full,3,2024-11-24T15:13:19,1,1,300\nall.csv,jar:open,4,1732461199,2,301,600\n"
+        "all.csv,jar:full,3,24.11.2024 15:13:19,1,1,300\nall.csv,jar:open,4,1732461199,2,301,600\n"
     )
     grasps = recordings(tmp_path, 'list = "list.csv"\nrate_hz = 100\ngap = "gap"\nforce = "F"')
     facts = [(grasp.label, grasp.instance, grasp.order, grasp.recorded_at) for grasp in grasps]

@@ -268,7 +268,7 @@ def test_of_a_store(tmp_path):
 
     trials = load_trials(f"store:{folder}", options=["features.force=left"])
     assert len(trials) == 2
-    assert any("1 of 3 recordings" in note and "phase" in note for note in trials.notes)
+    assert any("1 of 3 recordings" in note and names[3] in note for note in trials.notes)
 
     problems = verify_store(folder).problems
     for number in (2, 3, 4, 6):

@@ -157,10 +157,10 @@ class _Chosen:
         self.words = ""
         # A mistake in them is told before files are read.
         try:
-            self._settings = self._resolved("csv:the first recording")
+            self._settings = self.settings("csv:the first recording")
         except ImplausibleSettings as doubt:  # unless the recordings are in other units
             self._doubt, self._any_unit = doubt, True
-            self._settings = self._resolved("csv:the first recording")
+            self._settings = self.settings("csv:the first recording")
         self._leave_out_misfitting_model()
 
     def _leave_out_misfitting_model(self) -> None:
@@ -177,7 +177,7 @@ class _Chosen:
             if any(option.startswith("classifier.") for option in self._options):
                 raise
             self._options = (*self._options, "classifier.type=none")
-            self._settings = self._resolved("csv:the first recording")
+            self._settings = self.settings("csv:the first recording")
             self._unpredicted = "; no predictions, because the model of the pipeline takes other features"
 
     @contextmanager
@@ -225,11 +225,8 @@ class _Chosen:
         self.words = f"{thresholds.words}{self._unpredicted}"
         self._added = thresholds.options
 
-    def settings(self, recording: ImportedRecording) -> Settings:
-        """Return the settings under which a recording is replayed. Raises ConfigError."""
-        return self._resolved(recording.name)
-
-    def _resolved(self, name: str) -> Settings:
+    def settings(self, name: str) -> Settings:
+        """Return the settings under which the recording of this name is replayed. Raises ConfigError."""
         flags = (
             Flag("--gripper", "gripper.type", "replay"),
             Flag("SOURCE", "gripper.recording", name),
@@ -260,8 +257,8 @@ def _import(
     from graspsense.sources.importing.import_outcomes import refuse_useless, tried
 
     say = partial(echo, err=values_alone())
-    ends = tried(recordings, chosen.settings)
-    refuse_useless(recordings, ends.outcomes, chosen.settings(recordings[0]))
+    outcomes, doubts = tried(recordings, chosen.settings)
+    refuse_useless(recordings, outcomes, chosen.settings(recordings[0].name))
     stored = _store(save, recordings, unreadable, chosen)
     if not stored.kept and not stored.refused:
         raise error_of_all(unreadable)
@@ -282,7 +279,7 @@ def _import(
             say(f"  {note}")
     if stored.kept:
         say(f"  {chosen.words}")
-        _echo_notices(_summary(recordings), ends.notice, err=values_alone())
+        _echo_notices(_summary(recordings), doubts, err=values_alone())
     if again := [trial for trial in stored.kept if "earlier" in trial]:
         known = f"{again[0]['source']} is that of trial {again[0]['earlier']}"
         say(
@@ -325,7 +322,7 @@ def _store(
             with handed_over(recording.name, recording.labelled.recording):
                 try:
                     with readable(source):
-                        settings = chosen.settings(recording)
+                        settings = chosen.settings(recording.name)
                         trial, number = import_recording(
                             store, settings, installed(), recording.labelled, contents
                         )
@@ -374,8 +371,8 @@ def _show(
     from graspsense.sources.importing.import_outcomes import refuse_useless, tried
     from graspsense.sources.recordings.dataset_recordings import handed_over
 
-    summary, tries = _summary(recordings), tried(recordings, chosen.settings)
-    outcomes = tries.outcomes
+    summary = _summary(recordings)
+    outcomes, doubts = tried(recordings, chosen.settings)
     ends = {outcome.words: count for outcome, count in outcomes.most_common()}
     echo_values(
         {
@@ -383,7 +380,7 @@ def _show(
             "unreadable": [recording.line for recording in unreadable],
             "thresholds": chosen.words,
             "outcomes": ends,
-            "rests": tries.notice,
+            "rests": "; ".join(doubts),
         }
     )
     _echo_summary(summary)
@@ -391,15 +388,17 @@ def _show(
     echo_entry("thresholds", chosen.words.partition(": ")[2])
     some = "" if outcomes.total() == len(recordings) else f" (of {outcomes.total()} that were tried)"
     echo_entry("outcomes", ", ".join(f"{count} {words}" for words, count in ends.items()) + some)
-    _echo_notices(summary, tries.notice, err=False)
+    _echo_notices(summary, doubts, err=False)
     middle = recordings[len(recordings) // 2]
     try:
         with readable(middle.labelled.source), handed_over(middle.name, middle.labelled.recording):
-            trial = grasp_with(chosen.settings(middle), installed(), labels={"label": middle.labelled.label})
+            trial = grasp_with(
+                chosen.settings(middle.name), installed(), labels={"label": middle.labelled.label}
+            )
         draw_grasp(trial, picture)
     except (DataDamaged, PluginUnavailable) as error:
         echo(f"no picture: {error}", Style.CAUTION, err=True)
-    refuse_useless(recordings, outcomes, chosen.settings(recordings[0]))
+    refuse_useless(recordings, outcomes, chosen.settings(recordings[0].name))
 
 
 def _summary(recordings: Sequence[ImportedRecording]) -> ImportSummary:
@@ -441,7 +440,7 @@ def _span(values: Sequence[float]) -> str:
     return low if low == high else f"{low} to {high}"
 
 
-def _echo_notices(summary: ImportSummary, of_rests: str, *, err: bool) -> None:
+def _echo_notices(summary: ImportSummary, of_rests: Sequence[str], *, err: bool) -> None:
     """Print what looks wrong; of what differs in its numbers alone, the most frequent one as an example."""
     kinds: dict[str, Counter[str]] = {}
     for notice, count in summary.notices:
@@ -451,5 +450,5 @@ def _echo_notices(summary: ImportSummary, of_rests: str, *, err: bool) -> None:
         f"{', for example' if len(alike) > 1 else ''}: {next(iter(alike))}"
         for alike in kinds.values()
     ]
-    for notice in [*notices, *filter(None, [of_rests])]:
+    for notice in [*notices, *of_rests]:
         echo(f"  {notice}", Style.CAUTION, indent=2, err=err)

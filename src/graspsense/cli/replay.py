@@ -11,7 +11,7 @@ import click
 from graspsense.cli.options import force_option, keys_option, pipeline_option, plot_option
 from graspsense.cli.output import echo_values, json_option
 from graspsense.cli.run import draw_grasp, print_trial
-from graspsense.cli.terminal import talk
+from graspsense.cli.terminal import talk, warn
 from graspsense.core.components.registry import installed
 from graspsense.core.pipeline.wiring import check
 from graspsense.core.settings.layers import Flag
@@ -43,12 +43,18 @@ def replay(
     file, thresholds of contact and rest that are not set are those that `import` would choose.
     """
     from graspsense.core.pipeline.pipeline import grasp_with
+    from graspsense.sources.recordings.doubtful_rests import notices_of_rests
+    from graspsense.sources.recordings.replay import kind_and_name, read_named
 
     settings = _settings(recording, pipeline, options, force)
     check(settings)
     trial = grasp_with(settings, installed())
     echo_values(trial_as_json(trial))
     print_trial(trial)
+    kind, name = kind_and_name(settings.values["gripper"]["recording"])
+    if kind not in ("store", "mcap"):
+        for notice in notices_of_rests([(trial.features, read_named(kind, name))], "controller"):
+            warn(notice)
     if plot is not None:
         draw_grasp(trial, Path(plot))
 

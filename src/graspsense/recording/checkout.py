@@ -34,24 +34,15 @@ def checkout_state(folder: Path) -> dict[str, Any] | None:
     else:
         return None
     try:
-        git = _git_folder(top)
-        common = _common_folder(git)
+        # A linked worktree has a file that names its folder, and that names the one which all share.
+        git = top / ".git"
+        git = git if git.is_dir() else top / _text(git).strip().removeprefix("gitdir: ")
+        link = git / "commondir"
+        common = git / _text(link).strip() if link.exists() else git
         commit = _commit(git, common)
     except (OSError, ValueError):
         return None
     return None if commit is None else {"commit": commit, "dirty": _is_dirty(top, git, common, commit)}
-
-
-def _git_folder(top: Path) -> Path:
-    """Return the folder of git; a linked worktree has a file that names it."""
-    path = top / ".git"
-    return path if path.is_dir() else top / _text(path).strip().removeprefix("gitdir: ")
-
-
-def _common_folder(git: Path) -> Path:
-    """Return the folder that the worktrees of a repository share."""
-    link = git / "commondir"
-    return git / _text(link).strip() if link.exists() else git
 
 
 def _commit(git: Path, common: Path) -> str | None:

@@ -269,35 +269,26 @@ class RecordedGrasp:
                 column[k] = column[k]._replace(new=0, values=nothing.values)
         return column
 
-    def _rate_of_ticks(self) -> float:
-        """Return the number of ticks per unit of time, from their times; 1000 where these do not increase."""
-        times = self.ticks["t_s"]
-        elapsed = float(times[-1] - times[0]) if len(times) else 0.0
-        return (len(times) - 1) / elapsed if elapsed > 0.0 else 1000.0
-
     def recording(self) -> Recording:
         """Return the grasp in the form that a gripper can replay. Raises DataDamaged as `trace`."""
         with readable(f"the recording {self.path}"):
-            return self._recording()
-
-    def _recording(self) -> Recording:
-        units = {name: unit for name, unit in self.units.items() if SI_UNITS.get(name) != unit}
-        # An imported recording has no commands, and ends where the imported file ends.
-        known = not np.isnan(self.ticks["command"]).any()
-        record = self._readable_record()
-        return Recording(
-            name=f"recording {self.path.name} of {self.device.name or 'an unknown gripper'}",
-            readings=self.readings(),
-            rate_hz=self.device.rate_hz or self._rate_of_ticks(),
-            units=units,
-            notes=(*self.device.notes, REPLAY_NOTE),
-            commands=tuple(self.ticks["command"].tolist()) if known else None,
-            has_release=known and bool((self.ticks["phase"] == Phase.RELEASE).any()),
-            channels=self.channels,
-            mounting=self.device.mounting,
-            events=self.labelled_events(),
-            recorded_with={} if record is None else record.recorded_with,
-        )
+            # An imported recording has no commands, and ends where the imported file ends.
+            known = not np.isnan(self.ticks["command"]).any()
+            record, times = self._readable_record(), self.ticks["t_s"]
+            elapsed = float(times[-1] - times[0]) if len(times) else 0.0
+            return Recording(
+                name=f"recording {self.path.name} of {self.device.name or 'an unknown gripper'}",
+                readings=self.readings(),
+                rate_hz=self.device.rate_hz or ((len(times) - 1) / elapsed if elapsed > 0.0 else 1000.0),
+                units={name: unit for name, unit in self.units.items() if SI_UNITS.get(name) != unit},
+                notes=(*self.device.notes, REPLAY_NOTE),
+                commands=tuple(self.ticks["command"].tolist()) if known else None,
+                has_release=known and bool((self.ticks["phase"] == Phase.RELEASE).any()),
+                channels=self.channels,
+                mounting=self.device.mounting,
+                events=self.labelled_events(),
+                recorded_with={} if record is None else record.recorded_with,
+            )
 
 
 def _samples(row: Any, values: list[list[float]]) -> Samples:

@@ -254,16 +254,12 @@ def _hash_of_store(folder: str) -> str:
         with Store.read(folder) as store:
             trials = store.query(_OF_TRIALS)
             changes = store.query(_OF_CHANGES)
-            sizes = [_bytes_of(store.recording_path(name)) for _, name, *_ in trials]
+            paths = [store.recording_path(name) for _, name, *_ in trials]
+            sizes = [path.stat().st_size if path.is_file() else 0 for path in paths]
             lost = [[*row[:2], size] for row, size in zip(trials, sizes, strict=True) if size != row[2]]
     except GraspsenseError as error:
         return _hash([str(error)])  # the task tells it
     return _hash([json_text([list(row) for row in (*trials, *changes, *lost)])])
-
-
-def _bytes_of(path: Path) -> int:
-    """Return the size of a file; 0 if there is none."""
-    return path.stat().st_size if path.is_file() else 0
 
 
 def _hash_of_files(path: str, kind: str) -> str:

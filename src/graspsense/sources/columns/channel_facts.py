@@ -60,20 +60,22 @@ def channel_facts(
 
 def together(parts: Sequence[ChannelFacts]) -> ChannelFacts:
     """Return the facts of the same channel in several recordings: the extremes, and the median rate."""
-    rates = [part.rate_hz for part in parts if part.rate_hz is not None]
+
+    def known(name: str) -> list[float]:
+        return [value for part in parts if (value := getattr(part, name)) is not None]
+
+    rates = known("rate_hz")
     return ChannelFacts(
         name=parts[0].name,
         unit=parts[0].unit,
         samples=sum(part.samples for part in parts),
         missing=sum(part.missing for part in parts),
-        low=min((part.low for part in parts if part.low is not None), default=None),
-        high=max((part.high for part in parts if part.high is not None), default=None),
-        resolution=min((part.resolution for part in parts if part.resolution is not None), default=None),
+        low=min(known("low"), default=None),
+        high=max(known("high"), default=None),
+        resolution=min(known("resolution"), default=None),
         rate_hz=float(np.median(rates)) if rates else None,
-        longest_gap_s=max(
-            (part.longest_gap_s for part in parts if part.longest_gap_s is not None), default=None
-        ),
-        age_s=max((part.age_s for part in parts if part.age_s is not None), default=None),
+        longest_gap_s=max(known("longest_gap_s"), default=None),
+        age_s=max(known("age_s"), default=None),
     )
 
 

@@ -163,6 +163,7 @@ def signal_notices(recording: Recording) -> Iterator[str]:
             told += [*_glitches(force), *_seldom(force.what, force.t, force.n, FREE)]
             told += [] if doubtful else _rough(force)
         told += _drift(force)
+    told += _twice(mean)
     told = told or [*_rises_at_once(mean), *_falls_at_once(mean)]
     if not {"gap", "t"} & recording.units.keys():
         told += _bump(mean)
@@ -394,6 +395,24 @@ def _rough(force: _Force) -> Iterator[str]:
         )
 
 
+def _twice(force: _Force) -> Iterator[str]:
+    """Yield that samples come again, all in the same order, while the force changes: noise does not repeat itself."""
+    pairs = np.column_stack((force.gap, force.n))
+    new = np.flatnonzero((np.diff(pairs, axis=0) != 0.0).any(axis=1)) + 1
+    same = np.unique(pairs[new], axis=0, return_inverse=True)[1].ravel()
+    order, since = np.argsort(same, kind="stable"), np.zeros(len(new))
+    since[order[1:]] = np.diff(order) * (np.diff(same[order]) == 0)
+    for begin, end in _runs(since) if len(new) else ():
+        block = new[begin:end]
+        if min(since[begin], len(block)) >= LINE and np.ptp(force.n[block]) > PART * force.span:
+            yield (
+                f"the samples from {force.t[new[begin - int(since[begin])]]:.4g} s on come again at "
+                f"{force.when(block[0])}, {len(block)} of them: were lines written twice? All later times are then too "
+                "late"
+            )
+            return
+
+
 def _glitches(force: _Force) -> Iterator[str]:
     """Yield that a force leaves its course for a few samples: without a load, or by most of its range anywhere."""
     changes = np.flatnonzero(np.diff(force.n)) + 1
@@ -554,8 +573,11 @@ def _gap_leaps(t_s: Numbers, gap: Numbers) -> Iterator[str]:
     if np.count_nonzero(steps) >= FEWEST:
         k, usual = int(steps.argmax()), float(np.sort(steps)[-3])
         seconds = max(float(np.diff(t_s)[k]), float(np.median(np.diff(t_s))))
-        # A gap that is measured more rarely than the rows moves in the time between its values.
+        # A gap that is measured more rarely than the rows moves in the time between its values. Fingers that close as
+        # before on both sides were faster for this time alone.
         measured_s = max(seconds, period_s(t_s, gap))
+        if gap[k + 1] < gap[k] and steps[max(k - 1, 0) : k + 2].sum() <= steps[k] + 2.0 * usual:
+            measured_s /= 2.0
         least = min(LEAP_SPEED_M_S * seconds, usual + LEAP_M_S2 * measured_s**2)
         if _leap(steps, steps > 0.0, least) is not None:
             yield (

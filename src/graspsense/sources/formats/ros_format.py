@@ -80,7 +80,10 @@ def _collected(
     for topic, recorded_ns, message in _messages(path, topics):
         numbers = dict(numbers_in(message, ""))
         kept.add(sum(_NUMBER_BYTES + 8 * np.size(column) for column in numbers.values()))
-        came.setdefault(topic, []).append((_names_in(message), recorded_ns, stamp_ns(message), numbers))
+        # What its numbers are of, such as the names of joints.
+        names = getattr(message, "name", "")
+        names = names if isinstance(names, str) else "+".join(map(str, names))
+        came.setdefault(topic, []).append((names, recorded_ns, stamp_ns(message), numbers))
     values: dict[str, list[dict[str, Any]]] = {}
     times: dict[str, Messages] = {}
     for topic, messages in came.items():
@@ -99,12 +102,6 @@ def _collected(
     if not values:
         raise DataDamaged(f"{path} has no messages with numbers")
     return values, {topic: times[topic] for topic in values}
-
-
-def _names_in(message: Any) -> str:
-    """Return what a message says that its numbers are of, such as the names of joints."""
-    names = getattr(message, "name", "")
-    return names if isinstance(names, str) else "+".join(map(str, names))
 
 
 def _held(times: TopicTimes, messages: Sequence[dict[str, Any]], rows_ns: Nanoseconds) -> dict[str, Numbers]:

@@ -216,7 +216,11 @@ def _apart(stamped: Mapping[str, Nanoseconds], recorded: Mapping[str, Nanosecond
         return  # a bag that was written at once, by a program that did not record
     orders = {topic: np.argsort(ns, kind="stable") for topic, ns in recorded.items()}
     times = {topic: (recorded[topic][order], stamped[topic][order]) for topic, order in orders.items()}
-    least = {topic: _least_delays(*pair) for topic, pair in times.items()}
+    # In each part of a topic, the smallest delay from header to recording.
+    least = {
+        topic: [int(part.min()) for part in np.array_split(came - stamps, min(PARTS, len(came)))]
+        for topic, (came, stamps) in times.items()
+    }
     changed = [topic for topic, pair in times.items() if _was_set(*pair)]
     lowest = min(min(delays) for delays in least.values())
     behind = max(least, key=lambda topic: min(least[topic]))
@@ -236,17 +240,13 @@ def _apart(stamped: Mapping[str, Nanoseconds], recorded: Mapping[str, Nanosecond
 
 def _delays(topics: Mapping[str, Messages]) -> dict[str, int]:
     """Return the least delay from header to recording of each topic whose headers have times (ns)."""
-    delays = {}
-    for topic, messages in topics.items():
-        times = zip(messages.recorded_ns, messages.stamped_ns, strict=True)
-        if known := [recorded - stamped for recorded, stamped in times if stamped]:
-            delays[topic] = min(known)
-    return delays
-
-
-def _least_delays(recorded: Nanoseconds, stamped: Nanoseconds) -> list[int]:
-    """Return the smallest delay from header to recording in each part of a topic, whose messages are in order."""
-    return [int(part.min()) for part in np.array_split(recorded - stamped, min(PARTS, len(recorded)))]
+    every = {
+        topic: [
+            came - stamp for came, stamp in zip(times.recorded_ns, times.stamped_ns, strict=True) if stamp
+        ]
+        for topic, times in topics.items()
+    }
+    return {topic: min(delays) for topic, delays in every.items() if delays}
 
 
 def _drifting(duration_ns: int, least: Mapping[str, list[int]]) -> str:

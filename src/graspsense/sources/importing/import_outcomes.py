@@ -2,121 +2,46 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from attrs import field, frozen
 
 from graspsense.core.components.caller import set_option
 from graspsense.core.components.registry import installed
-from graspsense.core.grasp.gap_resolution import gap_resolution
 from graspsense.core.pipeline.pipeline import grasp_with
-from graspsense.core.values.errors import ConfigError, GraspsenseError, counted
+from graspsense.core.values.errors import ConfigError, GraspsenseError
 from graspsense.core.values.signals import Outcome
 from graspsense.sources.recordings.dataset_recordings import handed_over
+from graspsense.sources.recordings.doubtful_rests import notices_of_rests
 
 if TYPE_CHECKING:
     from graspsense.core.settings.resolved import Settings
-    from graspsense.core.values.features import Features
-    from graspsense.recording.replayable import Recording
     from graspsense.sources.importing.import_sources import ImportedRecording
 
 MOST: Final = 24
 """Number of recordings that are tried."""
 FEWEST: Final = 4
 """Number of recordings from which on most of them are not a coincidence."""
-MOST_TRAVEL: Final = 0.5
-"""Share of the travel of a squeeze after a rest, and"""
-PRESSED: Final = 2.0
-"""ratio of a later force to that of the rest, from which on most of the squeeze comes after it."""
-RIGID: Final = 0.01
-PRESSED_RIGID: Final = 1.4
-LOST: Final = 10.0
-"""Share of its range by which the gap closes at most on a rigid object, whose squeeze is that of the force alone, the
-same ratio there, and that of the force in the same gap to one that is gone."""
-UNCERTAIN: Final = 0.2
-"""Share of `delta_t` from which on the time of the last step of the gap makes it uncertain."""
-
-
-@frozen
-class TriedRecordings:
-    """How many of the recordings that were tried end in which way, and how many of their rests are doubtful."""
-
-    outcomes: Counter[Outcome] = field(factory=Counter)
-    pressing_on: int = 0
-    within_a_step: int = 0
-
-    @property
-    def notice(self) -> str:
-        """What looks wrong in the rests, empty if nothing does."""
-        told = {
-            "most of a squeeze, or much of its force, comes after the rest that p_steady, f_steady and delta_t are of. "
-            "If the fingers only stuck there, or a sensor stopped, ask for a longer rest: "
-            f"{set_option('controller.rest_window_s=SECONDS')}": self.pressing_on,
-            "the gap has coarse steps, and stays for a large part of delta_t before the last one: the fingers go on "
-            "within a step for as long and longer, so delta_t is too small, and cannot be told": self.within_a_step,
-        }
-        tried = counted(self.outcomes.total(), "grasp")
-        return "; ".join(f"{count} of {tried} tried: {what}" for what, count in told.items() if count)
 
 
 def tried(
-    recordings: Sequence[ImportedRecording], settings_of: Callable[[ImportedRecording], Settings]
-) -> TriedRecordings:
-    """Return how some recordings, evenly spread, end."""
+    recordings: Sequence[ImportedRecording], settings_of: Callable[[str], Settings]
+) -> tuple[Counter[Outcome], list[str]]:
+    """Return how many of some recordings, evenly spread, end in which way, and what looks wrong in their rests."""
     outcomes: Counter[Outcome] = Counter()
-    pressing_on = within_a_step = 0
-    for recording in recordings[:: -(-len(recordings) // MOST)]:
-        with handed_over(recording.name, recording.labelled.recording):
+    grasps = []
+    for imported in recordings[:: -(-len(recordings) // MOST)]:
+        recording = imported.labelled.recording
+        with handed_over(imported.name, recording):
             try:
-                trial = grasp_with(settings_of(recording), installed())
+                trial = grasp_with(settings_of(imported.name), installed())
             except GraspsenseError:  # which the import itself reports
                 continue
         outcomes[trial.outcome] += 1
-        pressing_on += presses_on(trial.features, recording.labelled.recording)
-        within_a_step += rests_within_a_step(trial.features, recording.labelled.recording)
-    return TriedRecordings(outcomes, pressing_on, within_a_step)
-
-
-def presses_on(features: Features, recording: Recording) -> bool:
-    """Return whether most of a squeeze comes after its rest, as it does if the fingers stick on their way.
-
-    A gap that shows no travel after the rest, nor before it, tells of no rest either. Nor is there one of a squeeze
-    where the force is gone, and the gap is what it was.
-    """
-    known = dict(zip(features.names, features.values, strict=True))
-    p_first, p_steady, f_steady = (known.get(name, math.nan) for name in ("p_first", "p_steady", "f_steady"))
-    gap, left, right = recording.columns("gap_m", "force_left_n", "force_right_n")
-    later, both = gap <= p_steady, (left + right) / 2.0
-    if not later.any():  # also without a rest, or without a gap
-        return False
-    narrowest, force = gap[later].min(), np.fmax.reduce(both[later])
-    still = RIGID * (np.fmax.reduce(gap) - narrowest)
-    lost = np.fmax.reduce(both[np.abs(gap - p_steady) <= still], initial=0.0) > LOST * max(f_steady, 0.0)
-    travels_on = p_steady - narrowest >= MOST_TRAVEL * (p_first - narrowest)
-    pressed = PRESSED_RIGID if p_first - narrowest < still else PRESSED if travels_on else math.inf
-    return bool(lost or force > pressed * f_steady)
-
-
-def rests_within_a_step(features: Features, recording: Recording) -> bool:
-    """Return whether a coarse gap stays for much of `delta_t` before its last step to the rest.
-
-    Fingers that slow down are then still within the next step for as long as that.
-    """
-    known = dict(zip(features.names, features.values, strict=True))
-    delta_t, p_steady = known.get("delta_t", math.nan), known.get("p_steady", math.nan)
-    t_s, gap = recording.columns("t_s", "gap_m")
-    reached = gap <= p_steady
-    if not (delta_t >= 0.0 and reached.any()) or {"t", "gap"} & recording.units.keys():
-        return False
-    resting = int(reached.argmax())
-    steps = np.flatnonzero(np.diff(gap[:resting])) + 1
-    last = int(steps[-1]) if len(steps) else 0
-    coarse = resting - last > 1 and gap_resolution(t_s.tolist(), gap.tolist(), resting).step_m > 0.0
-    return coarse and min(float(t_s[resting] - t_s[last]), delta_t) >= UNCERTAIN * delta_t
+        grasps.append((trial.features, recording))
+    return outcomes, notices_of_rests(grasps, "controller")
 
 
 def refuse_useless(

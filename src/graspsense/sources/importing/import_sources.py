@@ -33,9 +33,8 @@ KIND_OF = {".npz": "npz", ".parquet": "parquet", ".mcap": "mcap", ".bag": "rosba
 
 @frozen(kw_only=True, eq=False)
 class ImportedRecording:
-    """A recording to import: what the user typed, its name for `gripper.recording`, and what is known of it."""
+    """A recording to import: its name for `gripper.recording`, and what is known of it."""
 
-    source: str
     name: str
     labelled: LabelledRecording
 
@@ -86,7 +85,7 @@ def _named_by(
                 yield labelled
             else:
                 name = f"{kind}:{place}#{number}"
-                yield from each_readable(labelled.source, partial(_imported, source, name, labelled, label))
+                yield from each_readable(labelled.source, partial(_imported, name, labelled, label))
         return
     ending = Path(source).suffix.lower()
     name = f"csv:{named(source, columns)}" if is_csv(source) else source
@@ -94,7 +93,7 @@ def _named_by(
         name = f"{KIND_OF[ending]}:{source}"
     kind, file = kind_and_name(name)
     if is_recording_number(kind, file):
-        yield from _imported(source, name, numbered_recording(kind, file), label)
+        yield from _imported(name, numbered_recording(kind, file), label)
         return
     if kind not in KINDS:
         kinds = ", ".join(f"{known}:" for known in known_kinds())
@@ -105,7 +104,7 @@ def _named_by(
             f"{folder if Path(source).is_dir() else ''}"
         )
     recording = with_notices(LabelledRecording(recording=read_named(kind, file), source=source))
-    yield from _imported(source, name, recording, label)
+    yield from _imported(name, recording, label)
 
 
 def _dataset(source: str) -> tuple[str, str] | None:
@@ -118,12 +117,10 @@ def _dataset(source: str) -> tuple[str, str] | None:
     return (kind, place) if kind not in KINDS or Path(os.path.expanduser(place)).is_dir() else None
 
 
-def _imported(
-    source: str, name: str, labelled: LabelledRecording, label: str | None
-) -> tuple[ImportedRecording]:
+def _imported(name: str, labelled: LabelledRecording, label: str | None) -> tuple[ImportedRecording]:
     """Return a recording with the label that a user gave for all. Raises ConfigError if it, or its own, is none."""
     given = labels_of(label or labelled.label) if label is not None or labelled.label else {}
     if label is not None:
         instance = given.get("instance", "").partition("#")[2]
         labelled = evolve(labelled, label=given["label"], instance=instance)
-    return (ImportedRecording(source=source, name=name, labelled=labelled),)
+    return (ImportedRecording(name=name, labelled=labelled),)

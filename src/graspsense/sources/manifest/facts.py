@@ -19,11 +19,11 @@ from graspsense.sources.formats.numpy_files import npy_array
 from graspsense.sources.formats.table import ColumnTable
 from graspsense.sources.manifest.available import AvailableColumns
 from graspsense.sources.manifest.description import ReadManifest
-from graspsense.sources.manifest.files import NamedFile
+from graspsense.sources.manifest.files import FIELD, NamedFile
 
-FIELD: Final = re.compile(r"\{(\w+)\}")
-"""A field in a text of a manifest: `{fruit}`."""
 _NOT_IN_LABELS: Final = re.compile(r"[\s#,]+")
+_DOTTED: Final = re.compile(r"(\d\d?)\.(\d\d?)\.(\d{4})\b,?")
+"""A German date: `4.3.2024`."""
 _STAMP: Final = re.compile(r"(\d{4})-?(\d\d)-?(\d\d)[T _-]?(\d\d):?(\d\d):?(\d\d)(?:\.\d+)?")
 
 
@@ -86,6 +86,7 @@ def recorded_at_of(manifest: ReadManifest, table: ColumnTable) -> str:
 
 def iso_time(text: str) -> str:
     """Return a time in ISO 8601. Raises ValueError, OverflowError or OSError for a text that is none."""
+    text = _DOTTED.sub(lambda date: f"{date[3]}-{date[2]:>02}-{date[1]:>02}", text)
     stamp, number = _STAMP.fullmatch(text.removesuffix("Z")), number_in(text)
     if stamp is not None:
         return datetime(*(int(group) for group in stamp.groups()), tzinfo=UTC).isoformat()  # type: ignore[misc, arg-type]

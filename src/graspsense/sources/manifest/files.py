@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import glob
 import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
+from typing import Final
 
 from attrs import frozen
 
@@ -14,6 +16,9 @@ from graspsense.core.values.label_text import is_missing_label
 from graspsense.sources.formats.csv_columns import CsvColumns
 from graspsense.sources.formats.patterns import PatternError, file_template
 from graspsense.sources.manifest.description import ReadManifest, texts_of
+
+FIELD: Final = re.compile(r"\{(\w+)\}")
+"""A field in a text of a manifest: `{fruit}`."""
 
 
 @frozen(kw_only=True)
@@ -57,14 +62,18 @@ def left_out(manifest: ReadManifest) -> Iterator[str]:
     if manifest.keys.list or not wider:
         return
     used = {file.name for file in _matching(manifest, patterns)}
-    beside = {Path(name).name for name in (*texts_of(manifest.keys.beside), *manifest.value_files.values())}
-    others = [
-        file.name
-        for file in _matching(manifest, wider)
-        if file.name not in used and not {file.path.name} & beside
-    ]
-    if others:
-        yield f"not used: {listed(others)}, which have a text where {' or '.join(map(repr, patterns))} wants digits"
+    others = [file for file in _matching(manifest, wider) if file.name not in used]
+    known = beside(manifest, {file.path.parent for file in others})
+    if names := [file.name for file in others if file.path not in known]:
+        yield f"not used: {listed(names)}, which have a text where {' or '.join(map(repr, patterns))} wants digits"
+
+
+def beside(manifest: ReadManifest, folders: Iterable[Path]) -> set[Path]:
+    """Return the files in these folders that hold further columns, or values; a field in a name may be any text."""
+    names = (*texts_of(manifest.keys.beside), *manifest.value_files.values())
+    patterns = ["*".join(map(glob.escape, FIELD.split(name)[::2])) for name in names]
+    places = (os.path.join(glob.escape(str(folder)), pattern) for folder in folders for pattern in patterns)
+    return {Path(path) for place in places for path in glob.glob(place)}
 
 
 def _matching(manifest: ReadManifest, patterns: Sequence[str]) -> Iterator[NamedFile]:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import glob
 import math
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from itertools import islice
 from pathlib import Path
@@ -28,7 +27,6 @@ from graspsense.sources.formats.topic_clocks import Messages, common_clock
 from graspsense.sources.manifest.alike import MOST_COMPARED, compared
 from graspsense.sources.manifest.description import ReadManifest, axes_of, read_manifest, texts_of
 from graspsense.sources.manifest.facts import (
-    FIELD,
     filled,
     instance_of,
     label_of,
@@ -36,7 +34,7 @@ from graspsense.sources.manifest.facts import (
     recorded_at_of,
     values_of,
 )
-from graspsense.sources.manifest.files import NamedFile, files_of, left_out
+from graspsense.sources.manifest.files import FIELD, NamedFile, beside, files_of, left_out
 from graspsense.sources.manifest.notices import falls_on_closing, notices_of
 from graspsense.sources.manifest.samples import samples
 from graspsense.sources.manifest.steps import cut_at, resampled, squeezes
@@ -77,15 +75,7 @@ def manifest_files(place: str) -> list[Path]:
     manifest = read_manifest(Path(os.path.expanduser(place)))
     listed_in = [manifest.place.parent / manifest.keys.list] if manifest.keys.list else []
     files = [file.path for file in files_of(manifest)]
-    return [*listed_in, *files, *sorted(_beside(manifest, {file.parent for file in files}))]
-
-
-def _beside(manifest: ReadManifest, folders: Iterable[Path]) -> set[Path]:
-    """Return the files in these folders that hold further columns, or values; a field in a name may be any text."""
-    names = (*texts_of(manifest.keys.beside), *manifest.value_files.values())
-    patterns = ["*".join(map(glob.escape, FIELD.split(name)[::2])) for name in names]
-    places = (os.path.join(glob.escape(str(folder)), pattern) for folder in folders for pattern in patterns)
-    return {Path(path) for place in places for path in glob.glob(place)}
+    return [*listed_in, *files, *sorted(beside(manifest, {file.parent for file in files}))]
 
 
 def tables_of(manifest: ReadManifest, file: NamedFile) -> list[ColumnTable]:

@@ -16,7 +16,7 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 from graspsense.sources.columns.channel_facts import period_s, resolution, usual_range
-from graspsense.sources.columns.recording_notices import PART
+from graspsense.sources.columns.recording_notices import LOADED, PART
 from graspsense.sources.formats.table import Numbers
 from graspsense.sources.manifest.steps import NOISE
 
@@ -26,7 +26,7 @@ FAR: Final = 4
 LONGEST_S: Final = 0.2
 """A recording with too few samples to see a turn within this time (s) tells of none."""
 SHARP: Final = 0.7
-SMOOTH: Final = 0.3
+SMOOTH: Final = 0.32
 """How sharp a turn is that both signals have to make, and how sharp one that was smoothed."""
 HOLES: Final = 0.25
 """Largest share of the time in which samples are missing."""
@@ -91,8 +91,9 @@ def apart(t_s: Numbers, gap: Numbers, force: Numbers) -> Iterator[str]:
     widths, loads = np.interp(clock, t_s, gap), np.interp(clock, t_s, force)
     gaps, forces = _Turns.measured(gap, widths, n), _Turns.measured(force, loads, n)
     loaded, least = loads - usual_range(force)[0] > PART * forces.range, LARGEST * PART * forces.range
-    # A contact is no turn under a load, and a gap need not turn there.
-    pressed = (loaded & np.roll(loaded, n) & np.roll(loaded, -n))[FAR * n : -FAR * n]
+    # A gap need not turn at a contact, from where the force of a soft object and a slow drive grows ever faster.
+    high = loads - usual_range(force)[0] > LOADED * forces.range
+    pressed = (high & np.roll(high, n) & np.roll(high, -n))[FAR * n : -FAR * n]
     # A force that was smoothed over a longer time does not turn at all.
     due = gaps.far * forces.range / max(float(np.ptp(widths[loaded])), gaps.unknown)
     # Where the fingers begin to open, or meet more than before; their drive can speed up by itself.

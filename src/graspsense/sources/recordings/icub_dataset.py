@@ -137,11 +137,8 @@ def _grasps(folder: str) -> list[GraspFile]:
     place = within if within.is_dir() else given
     if not place.is_dir():
         raise ConfigError(f"there is no folder {given}: name the folder of the iCub Grasp Dataset")
-    grasps = []
-    for path in place.glob("*.txt"):
-        match = _FILE.fullmatch(path.name)
-        if match:
-            grasps.append((path, match["label"], int(match["number"])))
+    matches = [(path, _FILE.fullmatch(path.name)) for path in place.glob("*.txt")]
+    grasps = [(path, match["label"], int(match["number"])) for path, match in matches if match]
     if not grasps:
         raise ConfigError(f"{place} contains no file of the iCub Grasp Dataset (CLASS_NUMBER.txt)")
     return sorted(grasps, key=itemgetter(1, 2))
@@ -164,11 +161,6 @@ def _first_frame(grasps: list[IcubGrasp]) -> FeatureTable:
     joints = [f"joint_{FIRST_JOINT + k}" for k in range(9)]
     maxima = [f"{finger}_maximum" for finger in FINGERS]
     taxels = [f"{finger}_{k + 1}" for finger in FINGERS for k in range(12)]
-    values = np.array(
-        [
-            np.concatenate((grasp.encoders_deg[0], grasp.maxima[0], grasp.taxels[0].ravel()))
-            for grasp in grasps
-        ]
-    )
+    numbers = [(*grasp.encoders_deg[0], *grasp.maxima[0], *grasp.taxels[0].ravel()) for grasp in grasps]
     names = (*joints, *maxima, *taxels)
-    return FeatureTable(names=names, units=("deg",) * 9 + ("counts",) * 65, values=values)
+    return FeatureTable(names=names, units=("deg",) * 9 + ("counts",) * 65, values=np.array(numbers))

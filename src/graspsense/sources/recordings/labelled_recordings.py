@@ -26,6 +26,7 @@ from graspsense.recording.readable import each_readable, error_of_all, note_on
 from graspsense.recording.replayable import Recording, curve_bytes, grasp_numbers, recorded_channels
 from graspsense.sources.manifest.alike import compared
 from graspsense.sources.recordings.dataset_recordings import failing_as, readable_or_not
+from graspsense.sources.recordings.doubtful_rests import notices_of_rests
 from graspsense.sources.recordings.noise_thresholds import THRESHOLDS, thresholds_for
 from graspsense.store.first_line import first_line_table
 
@@ -63,7 +64,8 @@ def labelled_recordings(
     notes += [f"{counted(unlabelled, 'recording')} left out: no label"] if unlabelled else []
     counts = Counter(notice for fact in facts for notice in fact.notices)
     notes += [f"{counted(count, 'recording')}: {notice}" for notice, count in counts.items()]
-    notes += threshold_notes
+    rests = [(extracted, fact.recording) for (extracted, _), fact in zip(rows, facts, strict=True)]
+    notes += [*notices_of_rests(rests, "features"), *threshold_notes]
     units = {unit for fact in facts for unit in fact.recording.units.values()}
     if units:
         notes.append(f"units that are not SI units: {', '.join(sorted(units))}")

@@ -28,7 +28,6 @@ from typing import Any, Final
 import numpy as np
 from attrs import evolve
 
-from graspsense.core.components.channels import signal_type
 from graspsense.core.grasp.calibration import Cells, edge_force, masked, pad_force, tare, zero_of
 from graspsense.core.values.channel import Channel, FastChannel
 from graspsense.core.values.errors import ConfigError, DataDamaged, TareRefused
@@ -36,7 +35,7 @@ from graspsense.core.values.signals import Frame, Pads, Reading
 from graspsense.recording.readable import readable
 from graspsense.recording.replayable import Recording
 from graspsense.recording.unpacked import Unpacked
-from graspsense.sources.columns.fast_samples import most_in_a_tick, sample_blocks
+from graspsense.sources.columns.fast_samples import most_in_a_tick, sample_blocks, signals_in_ticks
 from graspsense.sources.columns.force_and_gap import doubtful_delay
 from graspsense.sources.formats.ros_bags import opened_bag, stamp_ns
 from graspsense.sources.formats.table import Numbers
@@ -298,10 +297,10 @@ def _with_acceleration(
     channel = FastChannel(
         "acceleration", "m/s2", rate_hz, samples=min(most, MOST_SAMPLES), axes=("x", "y", "z"), clock="sensor"
     )
-    make = signal_type((channel,))._make  # type: ignore[attr-defined]
     blocks = sample_blocks(times, np.array(sampled_s), np.array(values), channel)
+    signals = signals_in_ticks((channel,), [blocks], len(readings))
     return (channel,), tuple(
-        reading._replace(signals=make((block,))) for reading, block in zip(readings, blocks, strict=True)
+        reading._replace(signals=own) for reading, own in zip(readings, signals, strict=True)
     )
 
 
