@@ -39,7 +39,7 @@ from graspsense.classifier_api import table_of
 from graspsense.core.components.identification import RecordedSqueeze
 from graspsense.core.files.toml_text import toml_value
 from graspsense.evaluation.intervals import clustered, wilson
-from graspsense.experiments.versions import measured_on
+from graspsense.experiments.versions import where_measured
 from graspsense.plugin_api import create
 from graspsense.report.found_table import markdown_table
 from graspsense.simulator_api import RunConfig
@@ -380,8 +380,7 @@ def main() -> None:
             with asked.rows.open("a", encoding="utf-8") as out:
                 out.write(f"{json.dumps(row)}\n")
     print("\n".join(transfer_table(rows) if asked.transfer else tables(rows)))
-    where = ", ".join(f"{key} {value}" for key, value in measured_on().items())
-    print(f"\n{where}, {time.monotonic() - begin:.0f} s")
+    print(f"\n{where_measured()}, {time.monotonic() - begin:.0f} s")
 
 
 if __name__ == "__main__":

@@ -42,7 +42,7 @@ from graspsense.core.files.toml_text import toml_value
 from graspsense.core.values.trace import Trace
 from graspsense.evaluation.crossval import cross_validate
 from graspsense.evaluation.folds import stratified
-from graspsense.experiments.versions import measured_on
+from graspsense.experiments.versions import where_measured
 from graspsense.plugin_api import Classifier, Features, create
 from graspsense.sources.simulated import OBJECTS_PER_SEED, TRIALS_PER_SEED, Group
 from graspsense_paper.published import published
@@ -358,8 +358,7 @@ def main() -> None:
     )
     columns = {"start": start(), "found": descent.values, "catalogue": fitted()}
     print("\n".join(report(descent, columns, seeds, others)))
-    where = ", ".join(f"{key} {value}" for key, value in measured_on().items())
-    print(f"\n{n} seeds, {time.time() - began:.0f} s; {where}")
+    print(f"\n{n} seeds, {time.time() - began:.0f} s; {where_measured()}")
 
 
 def report(descent: Descent, columns: Mapping[str, Values], seeds: range, others: range) -> Iterator[str]:

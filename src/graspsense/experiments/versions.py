@@ -51,6 +51,11 @@ def measured_on() -> dict[str, str]:
     }
 
 
+def where_measured() -> str:
+    """Return `measured_on` as text."""
+    return ", ".join(f"{key} {value}" for key, value in measured_on().items())
+
+
 def differences(here: Mapping[str, str], there: Mapping[str, str]) -> list[str]:
     """Return the differences between two processes, in words."""
     return [
