@@ -48,11 +48,11 @@ def trained(name, tmp_path):
     return model
 
 
-SLOW = ("svm", "mlp", "extra-trees")
+SLOW = ("svm", "mlp", "extra-trees", "tree")
 
 
 @pytest.mark.parametrize(
-    "name", ["tree", "forest", *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW)]
+    "name", ["forest", *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW)]
 )
 def test_it_comes_back_the_same_without_its_training_trials(name, tmp_path):
     model = trained(name, tmp_path)

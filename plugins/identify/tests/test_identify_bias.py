@@ -27,7 +27,8 @@ def squeeze_of(name, seed=7, **gripper):
     return squeeze
 
 
-@pytest.mark.parametrize("name", ["spring", pytest.param("stiffening", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["spring", "stiffening"])
 def test_the_balance_of_energy_gives_the_share_of_the_cells_without_bias(name):
     # The friction is that of the settings: with a spread, it would scatter the share by 4 %.
     drive, _ = drive_and_pads(SimConfig())

@@ -232,6 +232,7 @@ def test_a_gripper_that_lost_its_power_is_not_activated_around_the_object(emulat
     driver.close()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wire", ["socket", "ur"])
 def test_a_gripper_whose_connection_broke_is_told_to_open_over_a_new_one(emulated, wire):
     gripper = emulated(wire)
