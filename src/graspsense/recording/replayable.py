@@ -178,9 +178,12 @@ def grasp_numbers(curves: Sequence[bytes]) -> list[int]:
         curve = curves[i]
         alike = longest.setdefault(curve[: _CURVE.size], [])
         whole = next((k for k in alike if curves[k].startswith(curve)), None)
-        frames = {curve[k : k + _CURVE.size] for k in range(0, len(curve), _CURVE.size)}
-        if whole is not None and (len(curves[whole]) == len(curve) or len(frames) >= _SHORTEST_PART):
+        if whole is not None and (len(curves[whole]) == len(curve) or _is_part(curve)):
             numbers[i] = whole
         else:
             alike.append(i)
     return numbers
+
+
+def _is_part(curve: bytes) -> bool:
+    return len({curve[k : k + _CURVE.size] for k in range(0, len(curve), _CURVE.size)}) >= _SHORTEST_PART
