@@ -8,18 +8,14 @@ from graspsense.core.values.signals import EFFORT, NO_PADS, SQUEEZE, Command, Fr
 from graspsense.plugin_api import signal_type
 
 COMMAND = Command(EFFORT, 5.0, math.inf, math.inf)
+CHANNELS = (
+    Channel("gap", "m", 1000.0),
+    Channel("temperature", "K", 1000.0),
+    TactileArray("skin", "counts", 100.0, rows=2, columns=3),
+    FastChannel("sound", "V", 4000.0, samples=4, axes=("x", "y")),
+)
 
 
-def channels(columns=3):
-    return (
-        Channel("gap", "m", 1000.0),
-        Channel("temperature", "K", 1000.0),
-        TactileArray("skin", "counts", 100.0, rows=2, columns=columns),
-        FastChannel("sound", "V", 4000.0, samples=4, axes=("x", "y")),
-    )
-
-
-CHANNELS = channels()
 Signals = signal_type(CHANNELS)
 
 
@@ -37,10 +33,10 @@ def device(channels=CHANNELS):
     )
 
 
-def reading(k, columns=3):
+def reading(k):
     t_s, nan = k / 1000, math.nan
     frame = Frame(t_s, 0.001, 0.05 - k * 1e-5, 0.0, 1.0 + k, nan, nan, nan, nan, 0)
-    skin = Image(t_s, k + 1, tuple(float(k + i) for i in range(2 * columns)))
+    skin = Image(t_s, k + 1, tuple(float(k + i) for i in range(6)))
     sound = Samples(t_s, 4 * k + 3, 3, (*((k + i / 4, -1.0) for i in range(3)), (nan, nan)))
     return Reading(frame, NO_PADS, Signals(300.0 + k, skin, sound))
 

@@ -141,7 +141,7 @@ def read_alone(folder, fmt, imported):
     """Read a good file and a changed one that are named each."""
     good, bad = (f"{fmt.prefix}{folder / name}{fmt.ending}" for name in ("good_1", "bad_2"))
     recordings, unreadable = recordings_to_import([good, bad], {}, "can:full")
-    assert recordings[0].source == good
+    assert recordings[0].labelled.source == good
     assert all("bad_2" in damage.line for damage in unreadable)
     if imported:
         import_into(folder / "trials", recordings)

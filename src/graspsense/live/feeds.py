@@ -75,6 +75,7 @@ class LiveFeed(Feed):
     def close(self) -> str:
         """End the process and return the error that it reports; empty if there is none."""
         self._drain(b"", self._end_timeout_s)
+        ended = self._broken or self._process.poll() not in (None, 0)
         try:
             out, _ = self._process.communicate(timeout=self._end_timeout_s)
         except subprocess.TimeoutExpired:
@@ -85,7 +86,6 @@ class LiveFeed(Feed):
         with suppress(ValueError, AttributeError):
             if error := json.loads(last[0]).get("error"):
                 return str(error)
-        ended = self._broken or self._process.returncode
         return (
             f"{self.name} ended before the grasps did: what it shows or writes is incomplete" if ended else ""
         )
