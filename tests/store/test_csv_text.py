@@ -17,6 +17,7 @@ from graspsense.core.files.csv_text import csv_text, text_of_cell
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.values.features import FeatureTable
 from graspsense.sources.trial_table.features_csv import read_labelled, write_labelled
+from graspsense.store.dataset import labelled_store
 from graspsense.store.store import Store
 
 FORMULAS = [
@@ -92,12 +93,16 @@ def store(tmp_path):
     return tmp_path / "t"
 
 
-def test_an_exported_store_is_harmless(store, tmp_path):
+def test_an_exported_store_is_harmless_and_evaluates_as_the_store(store, tmp_path):
     out = tmp_path / "table.csv"
     assert graspsense("export", str(store), "--to", str(out)).returncode == 0
     cells = cells_of(out.read_text())
     assert not any(map(runs, cells))
     assert "'=1+cmd|'/c calc'!A0#1" in cells
+    back, own = read_labelled(out, "label"), labelled_store(str(store))
+    assert back.labels == own.labels
+    assert back.instances == own.instances
+    assert (back.table.values == own.table.values).all()
 
 
 def test_a_label_forges_no_line_of_an_arff_file(tmp_path):

@@ -151,6 +151,23 @@ def test_a_newer_version_that_only_the_log_knows_is_refused(store):
         assert_refused(store, ConfigError, "Update graspsense")
 
 
+def test_an_older_store_is_brought_up_to_date_with_all_that_is_in_it(tmp_path, monkeypatch):
+    older = schema.VERSIONS
+    with Store.open(tmp_path / "trials") as store:
+        keep(store)
+    newer = (*older, ("ALTER TABLE trial ADD COLUMN mood TEXT", "CREATE INDEX by_mood ON trial (mood)"))
+    monkeypatch.setattr(schema, "VERSIONS", newer)
+    schema.tables_of_version.cache_clear()
+    monkeypatch.setattr(schema, "NEWEST", len(newer))
+    for module in ("store", "opening"):
+        monkeypatch.setattr(f"graspsense.store.{module}.NEWEST", len(newer))
+    with Store.read(tmp_path / "trials") as store:
+        assert store.trial(1).result.features.values == (0.066, 5.5)
+        assert store.query("SELECT mood FROM trial") == [(None,)]
+        assert store.query("PRAGMA user_version") == [(len(newer),)]
+    schema.tables_of_version.cache_clear()
+
+
 def test_a_migration_that_fails_leaves_the_store_as_it_was(tmp_path, monkeypatch):
     with Store.open(tmp_path / "trials") as store:
         keep(store)
