@@ -71,8 +71,8 @@ def test_labels_in_one_stretch_each_and_features_that_drift_leave_no_certainty()
         trials = (turns, drift, steady, evolve(drift, instances=named), evolve(steady, instances=named))
         # A single object of each is a name for the label.
         single = evolve(steady, instances=tuple(map(str, stretches)))
-        told.append([bool(confounded(each)) for each in (*trials, single, swept)])
-    assert told == [[True, True, True, True, False, True, False]] * 20
+        told.append([bool(confounded(t)) for t in (*trials, single, swept, evolve(swept, no_certainty="?"))])
+    assert told == [[True, True, True, True, False, True, False, True]] * 20
 
 
 @every_case(

@@ -266,8 +266,6 @@ def _shares(
     effect: float,
 ) -> dict[str, LabelShare]:
     """Return how often the answers with each label are right, as a share of the rates that they were promised."""
-    from scipy.special import betaincinv
-
     names, column = np.unique(labels, return_inverse=True)
     units, right_in, promised_in = (
         np.bincount(column, weights * counts).astype(np.float64)
@@ -284,10 +282,7 @@ def _shares(
             usual = (float(right_in[as_rare].sum()) + LABEL_WEIGHT / 2.0) / (promised_as_rare + LABEL_WEIGHT)
         mean = float(promised_in[k] / units[k])
         rate = mean * (right_in[k] + LABEL_WEIGHT * usual) / (promised_in[k] + LABEL_WEIGHT)
-        low, high = (
-            betaincinv(rate * (units[k] + 2.0), (1.0 - rate) * (units[k] + 2.0), end)
-            for end in (0.025, 0.975)
-        )
+        low, high = _interval(rate, units[k])
         low, share, high = (_share_of(float(end), mean) for end in (min(low, rate), rate, max(high, rate)))
         shares[str(names[k])] = LabelShare(share=share, low=low, high=high)
     return shares
@@ -321,6 +316,13 @@ def with_certainty(
     return result
 
 
+def _interval(rate: Any, units: Any) -> list[Any]:
+    """Return the ends of the 95 % interval of a rate, or of several, that is known from so many units."""
+    from scipy.special import betaincinv
+
+    return [betaincinv(rate * (units + 2.0), (1.0 - rate) * (units + 2.0), end) for end in (0.025, 0.975)]
+
+
 def _begins(
     values: NDArray[np.float64], weights: NDArray[np.float64], bounds: Sequence[float], least: float
 ) -> list[float]:
@@ -345,7 +347,6 @@ def _support_class(
 ) -> SupportClass:
     """Return the class of support that these answers make: the steps of the isotonic regression, with intervals."""
     from scipy.optimize import isotonic_regression
-    from scipy.special import betaincinv
 
     probability = np.round(probability, 9)
     values = np.unique(probability)
@@ -365,11 +366,10 @@ def _support_class(
     drawn = np.maximum(right_in / units - max(mean - guessing, 0.0) / (above + 1.0), guessing)
     # Two answers more, one of them right, leave none certain; they make no guess among several labels surer.
     rates = np.maximum.accumulate(np.minimum((units * drawn + 1.0) / (units + 2.0), drawn))
-    ends = (betaincinv(rates * (units + 2.0), (1.0 - rates) * (units + 2.0), end) for end in (0.025, 0.975))
     return SupportClass(
         least=least,
         probabilities=tuple(edges[number] for number in first_of.tolist()),
         rates=tuple(rates.tolist()),
         units=float(weights.sum()),
-        intervals=tuple(zip(*(end.tolist() for end in ends), strict=True)),
+        intervals=tuple(zip(*(ends.tolist() for ends in _interval(rates, units)), strict=True)),
     )

@@ -32,9 +32,9 @@ _DRIFT: Final = 5.0
 
 
 def confounded(labelled: Labelled) -> str:
-    """Return what the label cannot be told from in these trials; empty if nothing shows it, and for simulated ones."""
-    if labelled.provenance.get("simulated"):
-        return ""
+    """Return why these trials do not tell how often answers are right; empty if nothing shows it, or if simulated."""
+    if labelled.no_certainty or labelled.provenance.get("simulated"):
+        return labelled.no_certainty
     columns = zip(labelled.table.names, labelled.table.values.T, strict=True)
     features = [(name, column.tolist()) for name, column in columns if not np.isnan(column).any()]
     for name, values in (*features, *labelled.recorded_with.items()):

@@ -30,10 +30,8 @@ if TYPE_CHECKING:
 
     from graspsense.core.values.features import FeatureTable
 
-_SURE: Final = 100.0
-"""Equal pairs to be found for each one that is expected by chance, in a single feature."""
-_SURE_OF_ALL: Final = 10.0
-"""The same for all features together."""
+_SURE: Final = 10.0
+"""Equal pairs to be found for each one that is expected by chance."""
 _COMPARED: Final = 32
 """Features that are compared with each other, those with the most values."""
 _HASH_DIGITS: Final = 12
@@ -154,9 +152,8 @@ def _originals(table: FeatureTable, content: Sequence[str] | None) -> tuple[NDAr
         # What is left of trials that lack the same features, as those of stiff objects do, can have few values.
         alike = [i for i in repeated if (known[i] == given).all()]
         like = unique[(known[unique] == given).all(axis=1)]
-        distinct = values[like if len(like) >= _FEW else unique]
-        measured = [_is_measured(column, len(alike)) for column in distinct.T]
-        if (given & measured).any() or not _can_be_chance(distinct, len(alike)):
+        distinct = values[like if len(like) >= _FEW else unique][:, given]
+        if not _can_be_chance(distinct, len(alike)):
             sure += alike
     pairs = [*enumerate(same), *((i, equal[i]) for i in sure)]
     families = joined(np.array(pairs, dtype=np.int64).T, len(table))
@@ -188,7 +185,7 @@ def _edited_copies(values: NDArray[np.float64]) -> NDArray[np.int64]:
     share = (times[times < least].sum() + 1.0) / max(len(fine), 1) / (0.5 * n * n)
     by_chance = 0.5 * n * n * tail(least, len(fine), min(share, 1.0)) if least <= len(fine) else math.inf
     copies = pairs[times >= least]
-    if gammainc(len(copies), _SURE_OF_ALL * by_chance) > _BY_CHANCE:
+    if gammainc(len(copies), _SURE * by_chance) > _BY_CHANCE:
         copies = pairs[:0]
     return np.stack([copies // n, copies % n])
 
@@ -207,44 +204,29 @@ def _best_of(families: Sequence[int], known: Sequence[int]) -> NDArray[np.int64]
     return np.array([best[family] for family in families], dtype=np.int64)
 
 
-def _is_measured(column: NDArray[np.float64], repeated: int) -> bool:
-    """Return whether so many equal values show copies, because different trials hardly have the same value."""
-    given = column[~np.isnan(column)]
-    distinct = np.unique(given)
-    if len(distinct) < 2:
-        return False
-    if len(distinct) < _FEW:
-        # Only numbers that were calculated with all their digits are sure.
-        digits = max(
-            len(repr(value).partition("e")[0].strip("-0.").replace(".", "")) for value in distinct.tolist()
-        )
-        cells = 10.0**digits / 1e6
-    else:
-        cells = cells_in_range(distinct)
-    ties = len(given) - len(distinct)
-    return ties * _SURE < repeated and _SURE * len(given) ** 2 / (2.0 * cells) < repeated
-
-
 def _can_be_chance(distinct: NDArray[np.float64], repeated: int) -> bool:
     """Return whether so many trials may be equal to others of these different ones by chance.
 
-    They may if the values of all features have few combinations, and where trials often agree in all features but one.
+    They may if the values of all features have few combinations, and where trials often agree in all features but one
+    that has few values.
     """
     distinct = _independent(distinct)
-    if distinct.shape[1] <= 1:
-        return True
-    different = [np.unique(column[~np.isnan(column)]) for column in distinct.T]
-    combinations = math.prod(
-        len(column) if len(column) < _FEW else cells_in_range(column) for column in different if len(column)
-    )
-    trials = len(distinct) + repeated
-    if _SURE_OF_ALL * trials**2 / (2.0 * combinations) >= repeated:
-        return True
-    agreeing = 0
-    for left_out in range(distinct.shape[1]):
+    cells = [_values_of(column[~np.isnan(column)]) for column in distinct.T]
+    pairs = (len(distinct) + repeated) ** 2 / 2.0
+    by_chance = [pairs / math.prod(cells)]
+    for left_out, own in enumerate(cells):
         others = Counter(row.tobytes() for row in np.delete(distinct, left_out, axis=1))
-        agreeing += sum(count * (count - 1) // 2 for count in others.values())
-    return agreeing >= repeated
+        by_chance.append(sum(count * (count - 1) // 2 for count in others.values()) / own)
+    return _SURE * max(by_chance) >= repeated
+
+
+def _values_of(column: NDArray[np.float64]) -> float:
+    """Return how many values a column with these may have; of few, only all digits of a calculated number tell it."""
+    distinct = np.unique(column)
+    if len(distinct) >= _FEW:
+        return cells_in_range(distinct)
+    digits = (len(repr(value).partition("e")[0].strip("-0.").replace(".", "")) for value in distinct.tolist())
+    return max(len(distinct), 10.0 ** (max(digits, default=0) - 6), 1.0)
 
 
 def _independent(values: NDArray[np.float64]) -> NDArray[np.float64]:

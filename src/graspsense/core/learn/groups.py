@@ -76,12 +76,19 @@ def grouped(labelled: Labelled, copies: Numbers) -> Labelled:
     if labelled.instances is not None:
         links.append(_to_the_first(np.unique(np.array(labelled.instances), return_inverse=True)[1]))
     else:
-        group_of, why = _together(labelled, np.concatenate(links, axis=1))
+        group_of, why, clumped = _together(labelled, np.concatenate(links, axis=1))
+        name_them = f"Name the objects or sessions ({option('instance', 'COLUMN')})"
+        if clumped:
+            no_certainty = (
+                "of how many objects the clumps of trials are, and so how often other grasps are recognised, cannot be "
+                f"told. {name_them}"
+            )
+            labelled = evolve(labelled, no_certainty=no_certainty)
         if why:
             links.append(_to_the_first(group_of))
             notes.append(
                 f"{why} are held out as if of one object: grasps of one object, windows of one recording, and drift "
-                f"are so. Name the objects or sessions ({option('instance', 'COLUMN')})"
+                f"are so. {name_them}"
             )
     if not notes and not copies.size:
         return labelled
@@ -94,8 +101,8 @@ def grouped(labelled: Labelled, copies: Numbers) -> Labelled:
     )
 
 
-def _together(labelled: Labelled, copies: Numbers) -> tuple[Numbers, str]:
-    """Return the group of each trial, and in words which trials belong together besides copies; empty if none do."""
+def _together(labelled: Labelled, copies: Numbers) -> tuple[Numbers, str, bool]:
+    """Return the group of each trial, in words which belong together besides copies (if any), and if by clumps."""
     values, labels = _scaled(labelled.table.values), labelled.labels
     if labelled.value is not None:
         group_of, why = _of_one_number(np.array(labelled.value.values))
@@ -109,8 +116,8 @@ def _together(labelled: Labelled, copies: Numbers) -> tuple[Numbers, str]:
     first_of = np.array(joined(copies, len(labelled)))
     part_of = None if why or len(labelled) > _MOST_TRIALS else parts_of_clumps(values, labels, first_of)
     if part_of is None:
-        return group_of, why
-    return part_of, f"trials are in clumps that are alike. {len(np.unique(part_of))} parts of them"
+        return group_of, why, False
+    return part_of, f"trials are in clumps that are alike. {len(np.unique(part_of))} parts of them", True
 
 
 def _of_one_number(values: Values) -> tuple[Numbers, str]:

@@ -99,6 +99,8 @@ class Labelled:
     recorded_with: Mapping[str, tuple[str, ...]] = field(factory=dict)
     """What is known of how each trial was recorded and is no feature, by its name: settings, a session, an operator."""
     no_interval: str = ""
+    no_certainty: str = ""
+    """Why these trials do not tell how often answers are right; empty if nothing was found."""
     order: tuple[int, ...] | None = None
     no_order: str = ""
     content: tuple[str, ...] | None = None
