@@ -158,7 +158,7 @@ class Repeats:
         self._period_s = 1.0 / rate_hz
         self._gap_m = nan
         self._still_s = self._elapsed_s = 0.0
-        """The time since the last motion in which the gap stood still, at most a period of each frame, and all of it."""
+        """Time since the last motion in which the gap stood still, at most a period of each frame, and all of it."""
         self._motions: deque[Motion] = deque(maxlen=RECENT)
         self._steps_m: deque[float] = deque(maxlen=COARSE)
 
