@@ -37,8 +37,8 @@ TOLD_M: Final = 0.003
 """Travel that they must have been told in this time."""
 JUMP: Final = 3.0
 ARRIVES_S: Final = 0.02
-"""Speed over the commanded one that fingers can have between two frames. Their times are those of their arrival, so that
-up to this time it is taken over two frames."""
+"""Speed over the commanded one that fingers can have between two frames. Their times are those of their arrival: up to
+this time it is taken over two frames."""
 JUMP_M: Final = 0.001
 JUMP_STEPS: Final = 3.0
 FREE_M_S: Final = 0.3
