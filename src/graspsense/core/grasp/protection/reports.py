@@ -7,9 +7,10 @@ from collections.abc import Sequence
 from functools import reduce
 from math import inf, isfinite, nan
 from operator import or_
-from typing import Final, NamedTuple
+from typing import Final
 
 from graspsense.core.grasp.protection.losses import ENDS_SHARE, FEWEST
+from graspsense.core.grasp.protection.motor import RecentMean
 from graspsense.core.values.faults import Fault, StatusBit
 from graspsense.core.values.signals import CLOSING, Frame, Reading
 
@@ -19,10 +20,10 @@ FEWEST_STILL: Final = 3
 """Frames in a row that show a clock that stands still."""
 JUMP_S: Final = 0.1
 """Time between two frames, at least five periods, that is a jump of the clock or a stall."""
-RECENT: Final = 40
-"""Motions of an approach that are compared."""
+RECENT_S: Final = 0.2
+"""Time constant of the mean speed of an approach."""
 REPEATS: Final = 3
-REPEATED_SHARE: Final = 0.1
+REPEATED_SHARE: Final = 0.07
 """Motions, and their share, that make up for a standstill if frames come twice."""
 LONGER: Final = 0.97
 CATCH_UP: Final = 1.5
@@ -136,15 +137,6 @@ class Reports:
         )
 
 
-class Motion(NamedTuple):
-    """A way of the gap (m), at most in this time (s), after a standstill and with the time since the last motion."""
-
-    way_m: float
-    frame_s: float
-    still_s: float
-    elapsed_s: float
-
-
 class Repeats:
     """Watches the gap of fingers that approach for frames that come twice: it stands still, and then makes up for it.
 
@@ -156,48 +148,42 @@ class Repeats:
 
     def __init__(self, rate_hz: float) -> None:
         self._period_s = 1.0 / rate_hz
-        self._gap_m = nan
-        self._still_s = self._elapsed_s = 0.0
-        """Time since the last motion in which the gap stood still, at most a period of each frame, and all of it."""
-        self._motions: deque[Motion] = deque(maxlen=RECENT)
+        self._gap_m, self._still_s = nan, 0.0
+        self._speed_m_s = RecentMean(RECENT_S)
+        self._step_m = inf
+        """The least way of a frame that follows a motion."""
+        self._motions = self._repeats = 0
         self._steps_m: deque[float] = deque(maxlen=COARSE)
 
     def see(self, frame: Frame, *, jumped: bool = False) -> Fault | None:
         """Take the frame of a tick of the approach; return what the ways of the gap show. A jump is no way."""
         way_m = nan if jumped else self._gap_m - frame.gap_m
-        self._gap_m = frame.gap_m
+        self._gap_m, still_s, self._still_s = frame.gap_m, self._still_s, 0.0
         if not (way_m >= 0.0 and frame.dt_s > 0.0):
-            self._still_s = self._elapsed_s = 0.0
             return None
-        self._elapsed_s += frame.dt_s
+        self._speed_m_s.add(way_m / frame.dt_s, frame.dt_s)
         if way_m == 0.0:
-            self._still_s += min(frame.dt_s, self._period_s)
+            self._still_s = still_s + min(frame.dt_s, self._period_s)
             return None
-        motion = Motion(way_m, max(frame.dt_s, self._period_s), self._still_s, self._elapsed_s)
-        self._motions.append(motion)
-        self._still_s = self._elapsed_s = 0.0
-        if motion.still_s == 0.0:
+        self._motions += 1
+        if still_s == 0.0:
+            self._step_m = min(self._step_m, way_m)
             self._steps_m.clear()
             return None
         self._steps_m.append(way_m)
+        usual_m = self._speed_m_s.value * max(frame.dt_s, self._period_s)
+        is_long = self._speed_m_s.value * still_s > LONGER * self._step_m
+        self._repeats += is_long and way_m > CATCH_UP * max(self._step_m, usual_m)
         return self._coarse() or self._repeated()
 
     def _repeated(self) -> Fault | None:
-        """Return the fault of a gap that stood still for longer than a step takes, and then moved by more than one."""
-        motions = self._motions
-        step_m = min((motion.way_m for motion in motions if not motion.still_s), default=inf)
-        mean_m_s = sum(motion.way_m for motion in motions) / sum(motion.elapsed_s for motion in motions)
-        repeats = sum(
-            mean_m_s * motion.still_s > LONGER * step_m
-            and motion.way_m > CATCH_UP * max(step_m, mean_m_s * motion.frame_s)
-            for motion in motions
-        )
-        if repeats < max(REPEATS, REPEATED_SHARE * len(motions)):
+        """Return the fault of a gap that often stood still for longer than a step takes, and then moved by more."""
+        if self._repeats < max(REPEATS, REPEATED_SHARE * self._motions):
             return None
         return Fault(
             "frames repeated",
-            f"in the approach the gap stood still {repeats} times, and then made up for it: some frames come twice, so "
-            "that a standstill may be none; check the connection",
+            f"in the approach the gap stood still {self._repeats} times, and then made up for it: some frames come "
+            "twice, so that a standstill may be none; check the connection",
         )
 
     def _coarse(self) -> Fault | None:
