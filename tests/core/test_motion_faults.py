@@ -1,6 +1,7 @@
 """Faults that the motion of fingers shows that a command has told a speed, and that their effort shows."""
 
 from math import inf, nan
+from random import Random
 
 from cases import every_case
 
@@ -84,9 +85,18 @@ def approach(k):
     ],
 )
 def test_frames_that_come_twice_show_in_what_the_gap_makes_up_for(way_m, names):
-    watch = Repeats()
+    watch = Repeats(RATE_HZ)
     faults = [watch.see(frame(k, 0.08 - way_m(k))) for k in range(120)]
     assert {fault.name for fault in faults if fault is not None} == names
+
+
+def test_frames_that_come_early_and_late_do_not_come_twice():
+    for seed in range(20):
+        watch, chance, t_s = Repeats(RATE_HZ), Random(seed), 0.0
+        for k in range(1, 120):
+            last_s, t_s = t_s, max(k / RATE_HZ, t_s) + chance.expovariate(4.0 * RATE_HZ)
+            gap_m = 0.08 - in_steps(approach(RATE_HZ * t_s), 0.00037)
+            assert watch.see(Frame(t_s, t_s - last_s, gap_m, -0.02)) is None
 
 
 def grasp_with(effort):

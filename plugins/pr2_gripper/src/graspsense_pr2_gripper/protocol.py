@@ -59,7 +59,7 @@ class ProtocolError(ValueError):
 
 
 class InputReport(NamedTuple):
-    """Report 1; fields and units as in the document. `samples` are the accelerometer's words, `cells` four cells."""
+    """Report 1; order, fields and units as in the document. `samples` are the accelerometer's words, `cells` four."""
 
     sequence: int
     time_us: int
@@ -110,23 +110,14 @@ def encode_input(report: InputReport) -> bytes:
     if len(report.samples) > MAX_SAMPLES:
         raise ProtocolError(f"a report holds {MAX_SAMPLES} accelerometer samples, not {len(report.samples)}")
     try:
-        body = INPUT_LAYOUT.pack(
-            INPUT_ID,
-            report.sequence,
-            report.time_us,
-            report.encoder_ticks,
-            report.velocity_mtick_s,
-            report.effort_un,
-            report.status,
-            report.echo,
-            len(report.samples),
-            *words,
-            report.image,
-            report.slice,
-            *report.cells,
-            report.command_result,
-            report.image_age_us,
+        head, samples, image, cells, tail = (
+            report[:7],
+            report.samples,
+            report[8:10],
+            report.cells,
+            report[11:],
         )
+        body = INPUT_LAYOUT.pack(INPUT_ID, *head, len(samples), *words, *image, *cells, *tail)
     except struct.error as error:
         raise ProtocolError(f"an input report cannot hold {report}: {error}") from None
     return _sealed(body)
@@ -135,30 +126,14 @@ def encode_input(report: InputReport) -> bytes:
 def decode_input(data: bytes) -> InputReport:
     """Return report 1 from its bytes. Raises ProtocolError."""
     _check(data, INPUT_ID)
-    # fmt: off
-    (_, sequence, time_us, ticks, velocity, effort, status, echo, count, s0, s1, s2, s3,
-     image, slice_, c0, c1, c2, c3, result, age) = INPUT_LAYOUT.unpack_from(data)
-    # fmt: on
+    _, *head, count, s0, s1, s2, s3, image, slice_, c0, c1, c2, c3, result, age = INPUT_LAYOUT.unpack_from(
+        data
+    )
     if count > MAX_SAMPLES or slice_ >= SLICES or result > REFUSED:
         raise ProtocolError(
             f"input report out of range: {count} samples, slice {slice_}, command result {result}"
         )
-    samples = (s0, s1, s2, s3)[:count]
-    return InputReport(
-        sequence=sequence,
-        time_us=time_us,
-        encoder_ticks=ticks,
-        velocity_mtick_s=velocity,
-        effort_un=effort,
-        status=status,
-        echo=echo,
-        samples=samples,
-        image=image,
-        slice=slice_,
-        cells=(c0, c1, c2, c3),
-        command_result=result,
-        image_age_us=age,
-    )
+    return InputReport._make((*head, (s0, s1, s2, s3)[:count], image, slice_, (c0, c1, c2, c3), result, age))
 
 
 def encode_output(report: OutputReport) -> bytes:
@@ -174,16 +149,10 @@ def encode_output(report: OutputReport) -> bytes:
 def decode_output(data: bytes) -> OutputReport:
     """Return report 2 from its bytes. Raises ProtocolError."""
     _check(data, OUTPUT_ID)
-    _, counter, kind, effort, effort_limit, speed_limit, _ = OUTPUT_LAYOUT.unpack_from(data)
-    if kind not in (RELEASE_KIND, EFFORT_KIND):
-        raise ProtocolError(f"there is no command kind {kind}")
-    return OutputReport(
-        counter=counter,
-        kind=kind,
-        effort_un=effort,
-        effort_limit_un=effort_limit,
-        speed_limit_um_s=speed_limit,
-    )
+    report = OutputReport(*OUTPUT_LAYOUT.unpack_from(data)[1:-1])
+    if report.kind not in (RELEASE_KIND, EFFORT_KIND):
+        raise ProtocolError(f"there is no command kind {report.kind}")
+    return report
 
 
 def encode_identity(identity: Identity) -> bytes:

@@ -231,7 +231,16 @@ class RobotiqBackend(BackendWithEmulator[RobotiqConfig]):
         return (left, right), signal_type(self.channels)(*self._fingertips.signals(self._polling.began_s))
 
     def _described(self) -> DeviceInfo:
-        model = self._model
+        config, model = self.config, self._model
+        numbers = {"newtons_per_ampere": config.newtons_per_ampere}
+        notes = [
+            "effort is the motor's current times gripper.newtons_per_ampere, an assumption unless you measured it"
+        ]
+        if config.tactile_port:
+            numbers["pad_counts_per_n"] = config.pad_counts_per_newton
+            notes.append(
+                f"the forces are counts over gripper.pad_counts_per_newton, likewise: {SCALE_UNSEEN}"
+            )
         info = DeviceInfo(
             name=model.name,
             clock="device",
@@ -243,22 +252,8 @@ class RobotiqBackend(BackendWithEmulator[RobotiqConfig]):
             relaxed=Command(VELOCITY, 0.0, self.least_force_n, inf),
             tare_images=TARE_IMAGES if self._fingertips is not None else 0,
             status_bits=STATUS_BITS,
-            numbers={
-                "newtons_per_ampere": self.config.newtons_per_ampere,
-                **(
-                    {"pad_counts_per_n": self.config.pad_counts_per_newton}
-                    if self.config.tactile_port
-                    else {}
-                ),
-            },
-            notes=(
-                "effort is the motor's current times gripper.newtons_per_ampere, an assumption unless you measured it",
-                *(
-                    ("the forces are counts over gripper.pad_counts_per_newton, likewise: " + SCALE_UNSEEN,)
-                    if self.config.tactile_port
-                    else ()
-                ),
-            ),
+            numbers=numbers,
+            notes=tuple(notes),
         )
         return self.marked(info)
 

@@ -127,28 +127,22 @@ class UsbipServer:
         waiting, self._waiting = self._waiting, []
         for submission in waiting:
             if submission.endpoint == 0:
-                answer = self._usb.control(submission.setup, submission.data)
-                if answer is None:
-                    self._return(submission, -errno.EPIPE, 0, b"")
-                else:
-                    self._return(
-                        submission,
-                        0,
-                        len(answer) if submission.is_in else submission.length,
-                        answer if submission.is_in else b"",
-                    )
+                self._return(submission, self._usb.control(submission.setup, submission.data))
             elif not submission.is_in:
                 self._device.output(submission.data)
-                self._return(submission, 0, submission.length, b"")
+                self._return(submission, b"")
             elif self._usb.halted:
-                self._return(submission, -errno.EPIPE, 0, b"")
+                self._return(submission, None)
             elif self._armed:
                 report, self._armed = self._armed[: submission.length], b""
-                self._return(submission, 0, len(report), report)
+                self._return(submission, report)
             else:
                 self._waiting.append(submission)
 
-    def _return(self, waiting: _Waiting, status: int, length: int, data: bytes) -> None:
+    def _return(self, waiting: _Waiting, answer: bytes | None) -> None:
+        """Complete a transfer with this answer of the device, which a host that writes does not get; None: a stall."""
+        status, data = (-errno.EPIPE, b"") if answer is None else (0, answer if waiting.is_in else b"")
+        length = waiting.length if not (waiting.is_in or status) else len(data)
         self._write(RETURN.pack(RET_SUBMIT, waiting.number, 0, 0, 0, status, length, 0, 0, 0) + data)
 
     def _write(self, data: bytes) -> None:

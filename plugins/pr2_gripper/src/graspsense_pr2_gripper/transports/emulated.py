@@ -21,7 +21,7 @@ class LockStepTransport(Transport):
     """Device time advances by one period whenever a read finds no queued report, and at no other time."""
 
     def __init__(self, wire: Wire) -> None:
-        self._wire = wire
+        self._wire, self._failed = wire, ""
         self._period_s = 1.0 / wire.firmware.identity.report_rate_hz
         self._waiting: deque[bytes] = deque()
 
@@ -31,16 +31,14 @@ class LockStepTransport(Transport):
         if not waiting:
             for _ in range(math.ceil(timeout_s / self._period_s - 1e-9)):
                 waiting.extend(self._wire.step())
-                if self._wire.unplugged:
-                    raise TransportGone(_GONE)
+                self._check()
                 if waiting:
                     break
         return waiting.popleft() if waiting else b""
 
     def write(self, report: bytes) -> None:
         """Send a command to the board."""
-        if self._wire.unplugged:
-            raise TransportGone(_GONE)
+        self._check()
         self._wire.output(report)
 
     def feature(self, report_id: int) -> bytes:
@@ -49,6 +47,10 @@ class LockStepTransport(Transport):
 
     def close(self) -> None:
         """Do nothing: there are no resources."""
+
+    def _check(self) -> None:
+        if self._wire.unplugged or self._failed:
+            raise TransportGone(self._failed or _GONE)
 
 
 @final
@@ -59,34 +61,27 @@ class PacedTransport(LockStepTransport):
         super().__init__(wire)
         self._arrived = threading.Condition()
         self._stop = False
-        self._failed = ""
         self._thread = threading.Thread(target=self._run, name="emulated PR2 board", daemon=True)
         self._thread.start()
 
     def read(self, timeout_s: float) -> bytes:
         """Wait for a report."""
         with self._arrived:
-            self._arrived.wait_for(lambda: self._waiting or self._gone(), timeout_s)
+            self._arrived.wait_for(lambda: self._waiting or self._wire.unplugged or self._failed, timeout_s)
             if self._waiting:
                 return self._waiting.popleft()
-            if self._gone():
-                raise TransportGone(self._failed or _GONE)
+            self._check()
             return b""
 
     def write(self, report: bytes) -> None:
         """Send a command to the board."""
         with self._arrived:
-            if self._gone():
-                raise TransportGone(self._failed or _GONE)
-            self._wire.output(report)
+            super().write(report)
 
     def close(self) -> None:
         """Stop the thread of the board."""
         self._stop = True
         self._thread.join()
-
-    def _gone(self) -> bool:
-        return bool(self._wire.unplugged or self._failed)
 
     def _run(self) -> None:
         try:

@@ -58,15 +58,9 @@ class HidrawTransport(Transport):
     def feature(self, report_id: int) -> bytes:
         """Return a feature report."""
         try:
-            data = self._device.get_feature_report(report_id, REPORT_SIZE)
-        except (OSError, ValueError) as error:
+            return bytes(self._device.get_feature_report(report_id, REPORT_SIZE))
+        except (OSError, TypeError, ValueError) as error:
             raise TransportGone(f"feature report {report_id} of {self._path}: {error}") from error
-        try:
-            return bytes(data)
-        except (TypeError, ValueError) as error:
-            raise TransportGone(
-                f"feature report {report_id} of {self._path} is {data!r}, no bytes"
-            ) from error
 
     def close(self) -> None:
         """Close the node, after a stalled write has ended."""

@@ -98,15 +98,13 @@ class PyusbTransport(Transport):
     def feature(self, report_id: int) -> bytes:
         """Return a feature report through the control endpoint."""
         try:
-            data = self._device.ctrl_transfer(
-                *_GET_REPORT, _FEATURE_TYPE << 8 | report_id, _INTERFACE, REPORT_SIZE, FEATURE_TIMEOUT_MS
+            return bytes(
+                self._device.ctrl_transfer(
+                    *_GET_REPORT, _FEATURE_TYPE << 8 | report_id, _INTERFACE, REPORT_SIZE, FEATURE_TIMEOUT_MS
+                )
             )
-        except self._core.USBError as error:
+        except (self._core.USBError, TypeError, ValueError) as error:
             raise TransportGone(f"feature report {report_id}: {error}") from error
-        try:
-            return bytes(data)
-        except (TypeError, ValueError) as error:
-            raise TransportGone(f"feature report {report_id} is {data!r}, no bytes") from error
 
     def close(self) -> None:
         """Release the interface and return it to the kernel; errors of a lost device are ignored."""

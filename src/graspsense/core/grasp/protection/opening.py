@@ -36,7 +36,7 @@ TARGET_SHARE: Final = 0.05
 STOP: Final = 2.0
 """Effort over the friction of the drive with which fingers open until a stop."""
 AGAIN_M: Final = 0.001
-AGAIN_SHARE: Final = 0.02
+AGAIN_SHARE: Final = 0.01
 """By how much their width after a grasp may differ from that before it, at least and as a share of it."""
 
 

@@ -7,12 +7,10 @@ scale or zero than on closing. A pad that feels a force with open fingers has lo
 from __future__ import annotations
 
 from collections import deque
-from math import inf, nan
+from math import inf, log, log1p, nan
 from typing import Final
 
-import numpy as np
-
-from graspsense.core.grasp.protection.cells import DOUBT, FEWEST_IMAGES, MOST_NOISY, frozen
+from graspsense.core.grasp.protection.cells import DOUBT, MOST_NOISY, NOISY_SHARE
 from graspsense.core.grasp.protection.pad_forces import FREE_SHARE, PadBalance
 from graspsense.core.values.faults import Fault
 from graspsense.core.values.signals import APPROACH, CLOSING, Phase, Reading
@@ -40,6 +38,8 @@ ZERO_CONTACTS: Final = 0.5
 ZERO_SHARE: Final = 0.1
 """By how much the zero may have moved: a share of the contact force, or of the greatest force. The PR2's object
 manipulator tares again after a hard squeeze, since a rest of the load remains (pr2_gripper_reactive_approach)."""
+STILL_CHANCE: Final = log(1e-6)
+"""The logarithm of the probability below which noise does not explain that forces stand still."""
 SPIKE_CONTACTS: Final = 0.8
 SPIKE_SHARE: Final = 0.15
 """By how much a sample may differ from the mean of its neighbours, over what the other pad shows: a share of the
@@ -84,23 +84,33 @@ class PadCurve:
         """Take a sample while the fingers close or hold, with the gap at the time of which it can be."""
         self.press(force_n, earlier_gap_m)
         changed, self._last_n = force_n != self._last_n, force_n
+        self._still = 0 if changed else self._still + 1
         if phase == APPROACH:
             self._free_samples += 1
             self._changes += changed
-            return None
-        self._still = 0 if changed else self._still + 1
-        if force_n < -self._contact_n:
-            return Fault(
-                f"{self._side} pad below zero",
-                f"it feels {force_n:.1f} N while the fingers press, and nothing pulls: check its sign and its zero",
-            )
-        noise = min(self._changes / (self._free_samples + DOUBT), MOST_NOISY)
-        if self._still < FEWEST_IMAGES or not frozen(np.float64(noise), np.array(self._still)).all():
+        if phase == APPROACH or not force_n < -self._contact_n:
             return None
         return Fault(
+            f"{self._side} pad below zero",
+            f"it feels {force_n:.1f} N while the fingers press, and nothing pulls: check its sign and its zero",
+        )
+
+    @property
+    def _noise(self) -> float:
+        return min(self._changes / (self._free_samples + DOUBT), MOST_NOISY)
+
+    @property
+    def still_chance(self) -> float:
+        """The logarithm of the probability that its noise lets the force stand still for so long."""
+        return self._still * log1p(-self._noise) if self._noise >= NOISY_SHARE else 0.0
+
+    def stands_still(self) -> Fault:
+        """Return the fault of a force that does."""
+        return Fault(
             f"{self._side} pad stands still",
-            f"it gives {force_n:.2f} N in {self._still + 1} samples in a row, and changed in {100.0 * noise:.0f} % of "
-            "those in free air: it is at the end of its range, or stuck; check the fingertip",
+            f"it gives {self._last_n:.2f} N in {self._still + 1} samples in a row, and changed in "
+            f"{100.0 * self._noise:.0f} % of those in free air: it is at the end of its range, or stuck; check the "
+            "fingertip",
         )
 
     def open(self, force_n: float, t_s: float, gap_m: float, earlier_gap_m: float) -> Fault | None:
@@ -236,7 +246,19 @@ class PadCurves:
                 pad.press(force_n, earlier_gap_m)
             elif phase == Phase.RELEASE:
                 faults.append(pad.open(force_n, frame.t_s, frame.gap_m, earlier_gap_m))
+        if closing:
+            faults += self._stand_still()
         return [fault for fault in faults if fault is not None]
+
+    def _stand_still(self) -> list[Fault]:
+        """Return the faults of pads of which one alone, or both at once, stand still for longer than noise explains."""
+        chances = [pad.still_chance for pad in self._pads]
+        both = sum(chances) if all(chances) else 0.0
+        return [
+            pad.stands_still()
+            for pad, chance in zip(self._pads, chances, strict=True)
+            if min(chance, both) <= STILL_CHANCE
+        ]
 
     def released(self, t_s: float) -> list[Fault]:
         """Return what the pads show at the end of the release (s)."""

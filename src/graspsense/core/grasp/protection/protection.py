@@ -104,7 +104,7 @@ class Protection:
         first_m_s = run.first_speed_m_s if info.clock == "device" else inf
         self._standstill, self._jump = Standstill(), GapJump(info.speed_limit_m_s, info.rate_hz)
         self._kept_speed = KeptSpeed(info.rate_hz, min(first_m_s, info.speed_limit_m_s))
-        self._repeats = Repeats()
+        self._repeats = Repeats(info.rate_hz)
         opening = info.opening
         if opening is not None:
             # What the guard leaves of it, where no pad has felt anything.

@@ -10,6 +10,7 @@ from operator import or_
 from typing import Final
 
 from graspsense.core.grasp.protection.losses import ENDS_SHARE, FEWEST
+from graspsense.core.grasp.protection.motor import RecentMean
 from graspsense.core.values.faults import Fault, StatusBit
 from graspsense.core.values.signals import CLOSING, Frame, Reading
 
@@ -19,12 +20,14 @@ FEWEST_STILL: Final = 3
 """Frames in a row that show a clock that stands still."""
 JUMP_S: Final = 0.1
 """Time between two frames, at least five periods, that is a jump of the clock or a stall."""
+RECENT_S: Final = 0.2
+"""Time constant of the mean speed of an approach."""
 REPEATS: Final = 3
-"""Standstills of an approach from which on the motion after them is compared."""
-RECENT: Final = 20
-"""Standstills that are compared."""
+REPEATED_SHARE: Final = 0.07
+"""Motions, and their share, that make up for a standstill if frames come twice."""
+LONGER: Final = 0.97
 CATCH_UP: Final = 1.5
-"""Speed of the gap in a frame after a standstill, over that of the next frame, from which on frames have come twice."""
+"""Time of such a standstill over that of a step, and way after it over the larger of a step and the usual way."""
 COARSE: Final = 3
 """Steps of a gap in a row that stood still before each of them."""
 STEPS_M: Final = 0.0009
@@ -137,41 +140,50 @@ class Reports:
 class Repeats:
     """Watches the gap of fingers that approach for frames that come twice: it stands still, and then makes up for it.
 
-    A gap in steps, or one that is measured for each n-th frame only, stands still too, but then moves no further than
-    after a motion. Where the steps are coarse, and it stands still before each of them, they are told.
+    A gap in steps stands still too, but not for longer than a step takes, and then moves no further than in two frames
+    in a row that move. One that is measured for each n-th frame only hardly has these. Frames of this rate (Hz) that
+    come early or late have a shorter or longer way, or only another time. Where the steps are coarse, and the gap
+    stands still before each of them, they are told.
     """
 
-    def __init__(self) -> None:
-        self._gap_m = self._way_m = self._caught_up_m_s = nan
-        self._speeds_m_s: deque[tuple[float, float]] = deque(maxlen=RECENT)
-        """Of each standstill, the speed in the frame after it, and in the next one."""
+    def __init__(self, rate_hz: float) -> None:
+        self._period_s = 1.0 / rate_hz
+        self._gap_m, self._still_s = nan, 0.0
+        self._speed_m_s = RecentMean(RECENT_S)
+        self._step_m = inf
+        """The least way of a frame that follows a motion."""
+        self._motions = self._repeats = 0
         self._steps_m: deque[float] = deque(maxlen=COARSE)
 
     def see(self, frame: Frame, *, jumped: bool = False) -> Fault | None:
         """Take the frame of a tick of the approach; return what the ways of the gap show. A jump is no way."""
-        way_m, earlier_m = (nan if jumped else self._gap_m - frame.gap_m), self._way_m
-        self._gap_m, self._way_m = frame.gap_m, way_m
-        caught_up_m_s, self._caught_up_m_s = self._caught_up_m_s, nan
-        if not (way_m > 0.0 and earlier_m >= 0.0 and frame.dt_s > 0.0):
+        way_m = nan if jumped else self._gap_m - frame.gap_m
+        self._gap_m, still_s, self._still_s = frame.gap_m, self._still_s, 0.0
+        if not (way_m >= 0.0 and frame.dt_s > 0.0):
             return None
-        # A frame that comes late has a longer way, and the same speed.
-        speed_m_s = way_m / frame.dt_s
-        if earlier_m == 0.0:
-            self._caught_up_m_s = speed_m_s
-            self._steps_m.append(way_m)
-            return self._coarse()
-        self._steps_m.clear()
-        if caught_up_m_s == caught_up_m_s:
-            self._speeds_m_s.append((caught_up_m_s, speed_m_s))
-        if len(self._speeds_m_s) < REPEATS:
+        self._speed_m_s.add(way_m / frame.dt_s, frame.dt_s)
+        if way_m == 0.0:
+            self._still_s = still_s + min(frame.dt_s, self._period_s)
             return None
-        after_m_s, next_m_s = (sum(speeds_m_s) for speeds_m_s in zip(*self._speeds_m_s, strict=True))
-        if after_m_s < CATCH_UP * next_m_s:
+        self._motions += 1
+        if still_s == 0.0:
+            self._step_m = min(self._step_m, way_m)
+            self._steps_m.clear()
+            return None
+        self._steps_m.append(way_m)
+        usual_m = self._speed_m_s.value * max(frame.dt_s, self._period_s)
+        is_long = self._speed_m_s.value * still_s > LONGER * self._step_m
+        self._repeats += is_long and way_m > CATCH_UP * max(self._step_m, usual_m)
+        return self._coarse() or self._repeated()
+
+    def _repeated(self) -> Fault | None:
+        """Return the fault of a gap that often stood still for longer than a step takes, and then moved by more."""
+        if self._repeats < max(REPEATS, REPEATED_SHARE * self._motions):
             return None
         return Fault(
             "frames repeated",
-            f"after standstills in the approach the gap moved {after_m_s / next_m_s:.1f} times as fast as in the frame "
-            "after that: some frames come twice, so that a standstill may be none; check the connection",
+            f"in the approach the gap stood still {self._repeats} times, and then made up for it: some frames come "
+            "twice, so that a standstill may be none; check the connection",
         )
 
     def _coarse(self) -> Fault | None:

@@ -10,7 +10,8 @@ from collections import deque
 from math import exp, inf, nan
 from typing import Final
 
-from graspsense.core.grasp.protection.motor import direction_of
+from graspsense.core.grasp.protection.effort_ceiling import asked_effort_n
+from graspsense.core.grasp.protection.motor import ALLOWED_N, RecentMean, direction_of
 from graspsense.core.grasp.protection.touch import CLOSED_M
 from graspsense.core.values.faults import Fault
 from graspsense.core.values.signals import APPROACH, EFFORT, FORCE, POSITION, VELOCITY, Command, Frame
@@ -35,7 +36,9 @@ STILL_S: Final = 3.0
 TOLD_M: Final = 0.003
 """Travel that they must have been told in this time."""
 JUMP: Final = 3.0
-"""Speed over the commanded one that fingers can have between two frames, whose times are those of their arrival."""
+ARRIVES_S: Final = 0.02
+"""Speed over the commanded one that fingers can have between two frames. Their times are those of their arrival: up to
+this time it is taken over two frames."""
 JUMP_M: Final = 0.001
 JUMP_STEPS: Final = 3.0
 FREE_M_S: Final = 0.3
@@ -55,10 +58,12 @@ FAST_S: Final = 0.2
 BLOCK_S: Final = 0.3
 """Time of a block over which a speed that is too slow is taken; at least four frames."""
 BLOCKS: Final = 3
-STEADY_SHARE: Final = 0.1
+STEADY_SHARE: Final = 0.2
 """Blocks in a row whose speeds differ by this share at most in a steady motion: fingers that accelerate are slow."""
 QUICK: Final = 1.2
 """Speed of a steady motion, over the commanded one, from which on the fingers are too fast."""
+AT_LIMIT: Final = 0.9
+"""Share of the limit of the effort from which on slow fingers may press something."""
 LEAST_M: Final = 0.001
 """Way by which the fingers must differ from what they were told: some steps of a coarse encoder."""
 
@@ -161,7 +166,7 @@ class GapJump:
         """Take the frame of a tick; return the jump that it shows."""
         # A clock that goes back has a fault of its own.
         dt_s = max(frame.dt_s, 0.0)
-        step_m, elapsed_s = frame.gap_m - self._gap_m, dt_s + self._dt_s
+        step_m, elapsed_s = frame.gap_m - self._gap_m, max(dt_s, min(dt_s + self._dt_s, ARRIVES_S))
         self._gap_m, self._dt_s = frame.gap_m, dt_s
         told_m_s = max(self._told_m_s)
         if self._effort:
@@ -198,8 +203,8 @@ class GapJump:
 class KeptSpeed:
     """Compares the way of the gap over the time with the commanded speed, for frames with this rate (Hz).
 
-    Fingers that have kept the speed once may become slower: they may press something. Whatever they are commanded, they
-    rush in an approach well beyond `limit_m_s`, that of a first use.
+    Fingers that have kept the speed once may become slower: they may press something, unless their effort stays what it
+    was. Whatever they are commanded, they rush in an approach well beyond `limit_m_s`, that of a first use.
     """
 
     def __init__(self, rate_hz: float, limit_m_s: float = inf) -> None:
@@ -210,11 +215,13 @@ class KeptSpeed:
         self._recent: deque[tuple[float, float]] = deque()
         self._blocks_m_s: deque[float] = deque(maxlen=BLOCKS)
         self._too_fast_s = self._block_t_s = self._block_gap_m = nan
-        self._kept = False
+        self._effort_n, self._limit_n = RecentMean(self._block_s), nan
+        self._kept, self._free_n = False, nan
+        """Whether they have kept the speed, and their effort when they last did."""
 
     def apply(self, frame: Frame, command: Command, *, jumped: bool) -> None:
         """Take the command that is applied after this frame; a gap that has `jumped` has no speed."""
-        told_m_s = told_speed_m_s(frame, command)
+        told_m_s, self._limit_n = told_speed_m_s(frame, command), asked_effort_n(command)
         if jumped or told_m_s != self._told_m_s:
             self._told_m_s = told_m_s
             self._recent.clear()
@@ -233,6 +240,7 @@ class KeptSpeed:
                 "its gap is in another unit; send it a position or a velocity instead of an effort, and give metres",
                 ends=True,
             )
+        self._effort_n.add(frame.effort_n, frame.dt_s)
         told_m_s = self._told_m_s
         if not 0.0 < abs(told_m_s) < inf:
             return None
@@ -262,13 +270,16 @@ class KeptSpeed:
             return None
         speed_m_s = speed_since(self._block_t_s, self._block_gap_m, frame)
         self._block_t_s, self._block_gap_m = frame.t_s, frame.gap_m
-        self._kept = self._kept or speed_m_s * FAST >= self._told_m_s
+        slow, effort_n = speed_m_s * FAST < self._told_m_s, self._effort_n.value
+        if not slow:
+            self._kept, self._free_n = True, effort_n
         blocks = self._blocks_m_s
         blocks.append(speed_m_s)
         steady = len(blocks) == BLOCKS and max(blocks) - min(blocks) <= STEADY_SHARE * speed_m_s
         if not steady or not speed_m_s * elapsed_s > LEAST_M:
             return None
-        if self._kept and speed_m_s <= QUICK * self._told_m_s:
+        presses = self._kept and not effort_n < min(self._free_n + ALLOWED_N, AT_LIMIT * self._limit_n)
+        if speed_m_s <= QUICK * self._told_m_s and (presses or not slow):
             return None
         return self._not_kept(speed_m_s)
 

@@ -32,6 +32,8 @@ from graspsense.core.values.signals import (
 
 TRAVEL_M: Final = 0.003
 """Travel of the gap after which the fingers must have made clear what they touch: 0.3 s at the paper's 10 mm/s."""
+SHARP_TRAVEL_M: Final = 0.006
+"""Travel after a contact whose force rose in a short one."""
 PUSHED_M: Final = 0.015
 """Travel for which one pad may push an object before the other one feels it."""
 PUSHED_SHARE: Final = 4.0
@@ -149,13 +151,17 @@ class Touch:
 
     def closing_limit_n(self) -> float:
         """Return the greatest closing effort (N) in this tick: that of the approach while a contact is not clear."""
-        unclear = self._alone_t_s == self._alone_t_s or self._claimed_t_s == self._claimed_t_s
-        if not unclear:
+        claimed = self._claimed_t_s == self._claimed_t_s and not self._sharp
+        if not (claimed or self._alone_t_s == self._alone_t_s):
             return inf
         needed_n = self._needed_n.value
         if needed_n != needed_n:
             return self._usual_n
         return NEEDED_MARGIN * needed_n + NEEDED_CONTACTS * self._contact_n
+
+    @property
+    def _sharp(self) -> bool:
+        return self._left.sharp or self._right.sharp
 
     def free(self) -> bool:
         """Whether neither pad feels anything."""
@@ -221,8 +227,8 @@ class Touch:
         return elapsed_s >= max(self._allowed_s(STALL_M / STALL_SHARE), 2.0 * LEAST_S)
 
     def _free_air(self, frame: Frame) -> Fault | None:
-        """A contact that both pads claim has a witness: the force rose in a short travel or on some cells only, the
-        fingers slow down, or the force goes on rising.
+        """A contact that both pads claim has a witness: the force rose on some cells only, the fingers slow down, or it
+        goes on rising. One that rose in a short travel may be a zero that has jumped, and is given a longer one.
         """
         if self._witnessed or not (self._left.felt and self._right.felt):
             self._claimed_t_s = nan
@@ -231,14 +237,13 @@ class Touch:
             self._claimed_t_s, self._claimed_gap_m = frame.t_s, frame.gap_m
             self._witnessed = self._on_some_cells()
         mean_m_s = self._approach_m_s.value
-        sharp = self._left.sharp or self._right.sharp
         slowed = self._speed_m_s.value < SLOWED_SHARE * mean_m_s
         # Over what the pads felt before the fingers closed, which may be no contact.
         risen = any(
             pad.force_n >= max(pad.first_n, self._contact_n) + self._contact_n
             for pad in (self._left, self._right)
         )
-        self._witnessed = self._witnessed or sharp or slowed or risen
+        self._witnessed = self._witnessed or slowed or risen
         if self._witnessed:
             self._claimed_t_s = nan
             return None
@@ -246,13 +251,16 @@ class Touch:
         # Fingers that have not approached cannot slow down: they may rest on the object.
         allowed_s = self._allowed_s(TRAVEL_M) if mean_m_s == mean_m_s else inf
         # Of fast fingers, the pads have not told more than the force of the contact within this travel.
-        if (elapsed_s < allowed_s and not travel_m >= TRAVEL_M) or elapsed_s < self._images_s:
+        allowed_m = TRAVEL_M
+        if self._sharp:
+            allowed_s, allowed_m = inf, SHARP_TRAVEL_M
+        if (elapsed_s < allowed_s and not travel_m >= allowed_m) or elapsed_s < self._images_s:
             return None
         return Fault(
             "contact in free air",
             f"both pads claim a contact, but the fingers moved on by {travel_m * 1e3:.1f} mm in {elapsed_s:.2f} s "
-            "without slowing down, and the force did not rise: the zero of the pads drifts; let them warm up, and "
-            "try again",
+            "without slowing down, and the force did not rise: the zero of the pads drifts or has jumped; let them "
+            "warm up, look at their cables, and try again",
             ends=True,
         )
 
