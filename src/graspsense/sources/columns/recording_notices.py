@@ -7,7 +7,9 @@ Ranges are without glitches. The noise of a force is its usual second difference
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from itertools import pairwise
 from typing import Final
@@ -17,6 +19,7 @@ from attrs import evolve, frozen
 from numpy.typing import NDArray
 
 from graspsense.core.control.contact import CONTACT_FORCE_N
+from graspsense.core.values.errors import counted
 from graspsense.core.values.fingers import FingerForce
 from graspsense.recording.labelled_recording import LabelledRecording
 from graspsense.recording.replayable import Recording
@@ -92,6 +95,28 @@ def with_notices(labelled: LabelledRecording) -> LabelledRecording:
     notices = (*labelled.notices, *labelled.recording.notices, *signal_notices(labelled.recording))
     notices = tuple(dict.fromkeys(notices))
     return evolve(labelled, notices=notices, recording=evolve(labelled.recording, notices=notices))
+
+
+def notices_together(recordings: Sequence[LabelledRecording]) -> tuple[tuple[str, int], ...]:
+    """Return what looks wrong in recordings, and in how many of them, the most frequent first.
+
+    What differs in its numbers alone is one, with the most frequent of these as an example.
+    """
+    kinds: dict[str, Counter[str]] = {}
+    for recording in recordings:
+        alike = {re.sub(r"\d+(?:\.\d+)?", "0", notice): notice for notice in recording.notices}
+        for kind, notice in alike.items():
+            kinds.setdefault(kind, Counter())[notice] += 1
+    every = sorted(kinds.values(), key=lambda alike: -alike.total())
+    return tuple(
+        (f"{'for example, ' * (len(alike) > 1)}{alike.most_common(1)[0][0]}", alike.total())
+        for alike in every
+    )
+
+
+def in_grasps(told: Iterable[tuple[str, int]], grasps: int) -> list[str]:
+    """Return what is told of some of so many grasps, each with the number of those."""
+    return [f"{count} of {counted(grasps, 'grasp')}: {what}" for what, count in told if count]
 
 
 @frozen(eq=False)

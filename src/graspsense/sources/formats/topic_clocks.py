@@ -8,12 +8,15 @@ stamped late, from one that is recorded at once.
 
 A value holds until the next message, but not longer than a few usual periods of its topic: a sensor that died has no
 value. Only the interval in which all topics have messages is used.
+
+A message that came before, with the same time in its header and the same numbers, is left out: two bridges, or two
+recordings that were joined, give each message twice.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
-from typing import Final
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from typing import Any, Final
 
 import numpy as np
 from attrs import field, frozen
@@ -67,11 +70,20 @@ class Messages:
 
     recorded_ns: list[int] = field(factory=list)
     stamped_ns: list[int] = field(factory=list)
+    _numbers: dict[int, Sequence[Any]] = field(factory=dict, init=False)
+    """The numbers of the last message with each time in its header."""
 
-    def add(self, recorded_ns: int, stamped_ns: int) -> None:
-        """Add a message."""
+    def add(self, recorded_ns: int, stamped_ns: int, numbers: Sequence[Any]) -> bool:
+        """Add a message with these numbers; return False if it came before."""
+        known = self._numbers.get(stamped_ns) if stamped_ns else None
+        if known is not None and len(known) == len(numbers):
+            pairs = zip(known, numbers, strict=True)
+            if all(np.array_equal(*pair, equal_nan=True) for pair in pairs):
+                return False
+        self._numbers[stamped_ns] = numbers
         self.recorded_ns.append(recorded_ns)
         self.stamped_ns.append(stamped_ns)
+        return True
 
 
 @frozen(kw_only=True, eq=False)
