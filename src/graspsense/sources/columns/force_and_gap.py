@@ -23,8 +23,8 @@ FEWEST: Final = 5
 """Fewest samples of the approach."""
 LAGS_S: Final = 0.005
 NOISE: Final = 5.0
-"""The fingers slow down where they are so late (s), and by so many times the noise of their gap. The force begins so many
-times its own noise above what it was."""
+"""The fingers slow down where they are so late (s), and by so many times the noise of their gap. The force begins
+where it is above what it was by so many times its own noise."""
 
 
 def doubtful_delay(t_s: Numbers, gap: Numbers, force: Numbers, later_s: float) -> str:
