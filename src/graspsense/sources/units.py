@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Final
 
@@ -77,7 +78,7 @@ def unit_in(heading: str) -> str:
     """Return the unit behind a name: `Load [N]` or `Load (N)`. Only a time has minutes: `Load (min)` is the least."""
     name, unit = name_and_unit(heading.translate(_ROUND))
     symbol = unit in ("min", "h", "d") and not _OF_TIME.match(name)
-    return unit if unit.lower() in UNITS and not symbol else ""
+    return unit if unit.lower() in UNITS - {*WITHOUT_UNIT} and not symbol else ""
 
 
 def names_and_units(headings: Sequence[str]) -> list[tuple[str, str]]:
@@ -88,13 +89,12 @@ def names_and_units(headings: Sequence[str]) -> list[tuple[str, str]]:
     >>> names_and_units(["force [N]", "fill [score]", "cell [1]", "cell [2]"])
     [('force', 'N'), ('fill', 'score'), ('cell [1]', ''), ('cell [2]', '')]
     """
-    alike: dict[str, list[str]] = {}
-    for heading in headings:
-        alike.setdefault(name_and_unit(heading)[0], []).append(heading)
-    whole = {
-        heading for own in alike.values() if len(own) > 1 and not all(map(unit_in, own)) for heading in own
-    }
-    return [(heading, "") if heading in whole else name_and_unit(heading) for heading in headings]
+    pairs = [name_and_unit(heading) for heading in headings]
+    alike = Counter(name for name, _ in pairs)
+    return [
+        pair if alike[pair[0]] == 1 or unit_in(heading) else (heading, "")
+        for heading, pair in zip(headings, pairs, strict=True)
+    ]
 
 
 _DATES_S: Final = (946_684_800.0, 4_102_444_800.0)

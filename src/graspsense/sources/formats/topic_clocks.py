@@ -15,7 +15,8 @@ recordings that were joined, give each message twice.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+import pickle
+from collections.abc import Collection, Iterator, Mapping
 from typing import Any, Final
 
 import numpy as np
@@ -70,20 +71,23 @@ class Messages:
 
     recorded_ns: list[int] = field(factory=list)
     stamped_ns: list[int] = field(factory=list)
-    _numbers: dict[int, Sequence[Any]] = field(factory=dict, init=False)
-    """The numbers of the last message with each time in its header."""
+    _known: set[int] = field(factory=set, init=False)
 
-    def add(self, recorded_ns: int, stamped_ns: int, numbers: Sequence[Any]) -> bool:
+    def add(self, recorded_ns: int, stamped_ns: int, numbers: Any) -> bool:
         """Add a message with these numbers; return False if it came before."""
-        known = self._numbers.get(stamped_ns) if stamped_ns else None
-        if known is not None and len(known) == len(numbers):
-            pairs = zip(known, numbers, strict=True)
-            if all(np.array_equal(*pair, equal_nan=True) for pair in pairs):
-                return False
-        self._numbers[stamped_ns] = numbers
+        message = hash((stamped_ns, pickle.dumps(numbers)))
+        if stamped_ns and message in self._known:
+            return False
+        self._known.add(message)
         self.recorded_ns.append(recorded_ns)
         self.stamped_ns.append(stamped_ns)
         return True
+
+    @property
+    def least_delay_ns(self) -> int:
+        """The least delay from header to recording, of those whose headers have a time."""
+        pairs = zip(self.recorded_ns, self.stamped_ns, strict=True)
+        return min(came - stamp for came, stamp in pairs if stamp)
 
 
 @frozen(kw_only=True, eq=False)
@@ -169,8 +173,9 @@ def common_clock(
     Raises DataDamaged if there is no time at which all topics have messages, or if times do not fit into 64 bits.
     """
     began_ns, times, notices = on_one_clock(source, topics)
-    delays = {} if notices else _delays({topic: topics[topic] for topic in needed or topics})
     wanted = {topic: times[topic] for topic in needed or times}
+    stamped = () if notices else (topic for topic in wanted if any(topics[topic].stamped_ns))
+    delays = {topic: topics[topic].least_delay_ns for topic in stamped}
     lasting = {topic: stamps for topic, stamps in wanted.items() if stamps.usual_ns} or wanted
     begin = max(int(stamps.ns[0]) for stamps in lasting.values())
     end = min(stamps.until_ns for stamps in lasting.values())
@@ -248,17 +253,6 @@ def _apart(stamped: Mapping[str, Nanoseconds], recorded: Mapping[str, Nanosecond
         yield (
             f"the times in the headers of {behind} are behind those of another topic, from another clock: {used}"
         )
-
-
-def _delays(topics: Mapping[str, Messages]) -> dict[str, int]:
-    """Return the least delay from header to recording of each topic whose headers have times (ns)."""
-    every = {
-        topic: [
-            came - stamp for came, stamp in zip(times.recorded_ns, times.stamped_ns, strict=True) if stamp
-        ]
-        for topic, times in topics.items()
-    }
-    return {topic: min(delays) for topic, delays in every.items() if delays}
 
 
 def _drifting(duration_ns: int, least: Mapping[str, list[int]]) -> str:
