@@ -102,7 +102,7 @@ TOLD = {
     # As of fingers that touch something on their way; those that bounce off, or open, are another matter.
     "a force that goes while the fingers close": ("comes at 0.31 s", LEFT + BUMP_N, RIGHT + BUMP_N, CLOSING_M),
     "a gap that stops in the squeeze": (
-        "then jumps by 1.42 mm", RELEASED_N, None, np.where((T_S >= 1.05) & (T_S < 1.6), SOFT_M[105], SOFT_M)
+        "the gap jumps by 1.42 mm", RELEASED_N, None, np.where((T_S >= 1.05) & (T_S < 1.6), SOFT_M[105], SOFT_M)
     ),
     "a gap that stops for good": (
         "although the force is gone", RELEASED_N, None, np.where(T_S >= 1.05, SOFT_M[105], SOFT_M)

@@ -35,7 +35,7 @@ def messages(t_s: Any, stamped_s: Any = None, delay_s: float = 0.002) -> Message
     """Messages that were recorded shortly after these times; without `stamped_s` their headers have these times."""
     joined = Messages()
     for time_s, stamp in zip(t_s, t_s if stamped_s is None else stamped_s, strict=True):
-        joined.add(BEGAN_NS + round((time_s + delay_s) * S), BEGAN_NS + round(stamp * S))
+        joined.add(BEGAN_NS + round((time_s + delay_s) * S), BEGAN_NS + round(stamp * S), [time_s])
     return joined
 
 
@@ -170,7 +170,10 @@ def written(tmp_path: Path) -> Any:
         )
 
     def write(kept: Any, stamped_s: Any = T_S, pr2: bool = False) -> LabelledRecording | UnreadableRecording:
-        """Write the messages of the tip that are `kept`, with these times in their headers, and import the bag."""
+        """Write the messages of the tip that are `kept`, with these times in their headers, and import the bag.
+
+        Where 2 of one are kept, each topic has its message twice.
+        """
         joint = "sensor_msgs/msg/JointState"
         topic = "/pressure/r_gripper_motor" if pr2 else "/tip"
         with Writer(tmp_path / "jar", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
@@ -180,13 +183,13 @@ def written(tmp_path: Path) -> Any:
                 names, still = ["r_gripper_joint"], np.zeros(1)
                 state = store.types[joint](header(t_s), names, np.array([gap]), still, still)
                 stamp_ns = BEGAN_NS + round(t_s * S) + 10**6
-                writer.write(hand, stamp_ns, store.serialize_cdr(state, joint))
-                if not kept[k]:
-                    continue
+                for late_ns in range(max(1, int(kept[k]))):
+                    writer.write(hand, stamp_ns + late_ns, store.serialize_cdr(state, joint))
                 load = np.full(22, 3000 + round(FORCE_N[k] * 100) + k % 3, dtype=np.int16)
                 kind, felt = (cells, (load, load)) if pr2 else (tip, (np.array([FORCE_N[k], 0.0]),))
                 message = store.types[kind](header(stamped_s[k]), *felt)
-                writer.write(force, stamp_ns, store.serialize_cdr(message, kind))
+                for late_ns in range(int(kept[k])):
+                    writer.write(force, stamp_ns + late_ns, store.serialize_cdr(message, kind))
         if pr2:
             (imported,), _ = recordings_to_import([f"rosbag:{tmp_path / 'jar'}"], {}, None)
             return imported.labelled
@@ -212,6 +215,7 @@ RISES = (T_S < 1.5) | (T_S > 2.0)
     [
         (T_S < 1.5, T_S, 151, "the other topics"),
         (T_S >= 0.03, T_S, 297, None),
+        (2 * ALL, T_S, 300, None),
         (ALL, T_S - 20.0, 300, "another clock"),
         (ALL, T_S - 0.03, 298, "30 ms older"),
         (ALL, T_S - 0.2, 281, "200 ms older"),
@@ -219,6 +223,7 @@ RISES = (T_S < 1.5) | (T_S > 2.0)
     ids=[
         "a topic that dies",
         "one that begins late",
+        "messages twice",
         "another clock",
         "a clock off by little",
         "a clock off by more",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -441,14 +440,8 @@ def _span(values: Sequence[float]) -> str:
 
 
 def _echo_notices(summary: ImportSummary, of_rests: Sequence[str], *, err: bool) -> None:
-    """Print what looks wrong; of what differs in its numbers alone, the most frequent one as an example."""
-    kinds: dict[str, Counter[str]] = {}
-    for notice, count in summary.notices:
-        kinds.setdefault(re.sub(r"\d+(?:\.\d+)?", "0", notice), Counter())[notice] = count
-    notices = [
-        f"{min(alike.total(), summary.grasps)} of {counted(summary.grasps, 'grasp')}"
-        f"{', for example' if len(alike) > 1 else ''}: {next(iter(alike))}"
-        for alike in kinds.values()
-    ]
-    for notice in [*notices, *of_rests]:
+    """Print what looks wrong."""
+    from graspsense.sources.columns.recording_notices import in_grasps
+
+    for notice in [*in_grasps(summary.notices, summary.grasps), *of_rests]:
         echo(f"  {notice}", Style.CAUTION, indent=2, err=err)

@@ -14,20 +14,17 @@ from graspsense.sources.columns.channel_facts import period_s, usual_range
 from graspsense.sources.formats.table import Numbers
 
 LEAST_S: Final = 0.015
-MOST_S: Final = 0.05
-"""Delays of two topics that differ by less (s) are usual; those that differ by more are always told."""
-BEGUN: Final = 0.05
+"""Delays of two topics that differ by less (s) are usual."""
 LOADED: Final = 0.2
-"""Shares of its range at which the force has begun, and at which that was no noise."""
+"""Share of its range above which a force is no noise."""
 APPROACH_S: Final = (0.25, 0.06)
 """Begin and end of the approach, before the force begins (s)."""
 FEWEST: Final = 5
 """Fewest samples of the approach."""
-LONGEST_STEP_S: Final = 0.0105
-"""Longest usual time between values of the force (s) with which its begin is known well enough."""
 LAGS_S: Final = 0.005
 NOISE: Final = 5.0
-"""The fingers slow down where they are so late (s), and by so many times the noise of their gap."""
+"""The fingers slow down where they are so late (s), and by so many times the noise of their gap. The force begins
+where it is above what it was by so many times its own noise."""
 
 
 def doubtful_delay(t_s: Numbers, gap: Numbers, force: Numbers, later_s: float) -> str:
@@ -40,7 +37,7 @@ def doubtful_delay(t_s: Numbers, gap: Numbers, force: Numbers, later_s: float) -
         return ""
     known = np.isfinite(t_s) & np.isfinite(gap) & np.isfinite(force)
     apart_s = _slows_after_force(t_s[known], gap[known], force[known])
-    if apart_s is not None and abs(apart_s) < 0.5 * abs(later_s) <= 0.5 * MOST_S:
+    if apart_s is not None and max(abs(apart_s), period_s(t_s[known], force[known])) < 0.5 * abs(later_s):
         return ""
     older, newer = ("force", "gap") if later_s > 0.0 else ("gap", "force")
     return (
@@ -55,14 +52,17 @@ def _slows_after_force(t_s: Numbers, gap: Numbers, force: Numbers) -> float | No
         return None
     low, high = usual_range(force)
     loaded = int(np.argmax(force > low + LOADED * (high - low)))
-    free = np.flatnonzero(force[:loaded] < low + BEGUN * (high - low))
+    # The rows can be more than the values of a signal.
+    newer, new = (np.concatenate(([True], np.diff(signal) != 0.0)) for signal in (force, gap))
+    bends = np.abs(np.diff(force[newer], 2))
+    noise = NOISE * float(np.median(bends)) if len(bends) else 0.0
+    free = np.flatnonzero(force[:loaded] < float(np.median(force[: loaded // 2 + 1])) + noise)
     if not len(free):
         return None
     begun_s = float(t_s[free[-1] + 1])
-    new = np.concatenate(([True], np.diff(gap) != 0.0))  # the rows can be more than the values of the gap
     times, values = t_s[new] - begun_s, gap[new]
     approach = (times > -APPROACH_S[0]) & (times < -APPROACH_S[1])
-    if approach.sum() < FEWEST or period_s(t_s, force) > LONGEST_STEP_S:
+    if approach.sum() < FEWEST:
         return None
     course = np.polyfit(times[approach], values[approach], 1)
     late = values - np.polyval(course, times)

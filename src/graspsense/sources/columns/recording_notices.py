@@ -7,7 +7,9 @@ Ranges are without glitches. The noise of a force is its usual second difference
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from itertools import pairwise
 from typing import Final
@@ -17,6 +19,7 @@ from attrs import evolve, frozen
 from numpy.typing import NDArray
 
 from graspsense.core.control.contact import CONTACT_FORCE_N
+from graspsense.core.values.errors import counted
 from graspsense.core.values.fingers import FingerForce
 from graspsense.recording.labelled_recording import LabelledRecording
 from graspsense.recording.replayable import Recording
@@ -53,8 +56,6 @@ LEAP: Final = 3.0
 LEAP_SPEED_M_S: Final = 1.0
 LEAP_M_S2: Final = 10.0
 """Speed beyond which no finger moves, and acceleration."""
-STOPPED_STEPS: Final = 5.0
-"""Least steps of a gap that one goes on by, at least, when its sensor had stopped."""
 LOADED_SAMPLES: Final = 5
 """A force that leaps after so many samples under a load is not that of a contact."""
 UNEQUAL: Final = 0.12
@@ -92,6 +93,28 @@ def with_notices(labelled: LabelledRecording) -> LabelledRecording:
     notices = (*labelled.notices, *labelled.recording.notices, *signal_notices(labelled.recording))
     notices = tuple(dict.fromkeys(notices))
     return evolve(labelled, notices=notices, recording=evolve(labelled.recording, notices=notices))
+
+
+def notices_together(recordings: Sequence[LabelledRecording]) -> tuple[tuple[str, int], ...]:
+    """Return what looks wrong in recordings, and in how many of them, the most frequent first.
+
+    What differs in its numbers alone is one, with the most frequent of these as an example.
+    """
+    kinds: dict[str, Counter[str]] = {}
+    for recording in recordings:
+        alike = {re.sub(r"\d+(?:\.\d+)?", "0", notice): notice for notice in recording.notices}
+        for kind, notice in alike.items():
+            kinds.setdefault(kind, Counter())[notice] += 1
+    every = sorted(kinds.values(), key=lambda alike: -alike.total())
+    return tuple(
+        (f"{'for example, ' * (len(alike) > 1)}{alike.most_common(1)[0][0]}", alike.total())
+        for alike in every
+    )
+
+
+def in_grasps(told: Iterable[tuple[str, int]], grasps: int) -> list[str]:
+    """Return what is told of some of so many grasps, each with the number of those."""
+    return [f"{count} of {counted(grasps, 'grasp')}: {what}" for what, count in told if count]
 
 
 @frozen(eq=False)
@@ -569,14 +592,17 @@ def _late(force: _Force, *, doubtful: bool) -> Iterator[str]:
 
 def _gap_leaps(t_s: Numbers, gap: Numbers) -> Iterator[str]:
     """Yield that a gap (m) leaps faster (s) than fingers move, or has new values so rarely that it changes by much."""
-    steps = np.abs(np.diff(gap))
-    if np.count_nonzero(steps) >= FEWEST:
+    moved, usual_s = np.diff(gap), float(np.median(np.diff(t_s)))
+    # Fingers can open much faster than they close, so a closing is compared with closings.
+    for steps in (np.maximum(-moved, 0.0), np.abs(moved)):
+        if np.count_nonzero(steps) < FEWEST:
+            continue
         k, usual = int(steps.argmax()), float(np.sort(steps)[-3])
-        seconds = max(float(np.diff(t_s)[k]), float(np.median(np.diff(t_s))))
+        seconds = max(float(np.diff(t_s)[k]), usual_s)
         # A gap that is measured more rarely than the rows moves in the time between its values. Fingers that close as
         # before on both sides were faster for this time alone.
         measured_s = max(seconds, period_s(t_s, gap))
-        if gap[k + 1] < gap[k] and steps[max(k - 1, 0) : k + 2].sum() <= steps[k] + 2.0 * usual:
+        if gap[k + 1] < gap[k] and np.abs(moved[max(k - 1, 0) : k + 2]).sum() <= steps[k] + 2.0 * usual:
             measured_s /= 2.0
         least = min(LEAP_SPEED_M_S * seconds, usual + LEAP_M_S2 * measured_s**2)
         if _leap(steps, steps > 0.0, least) is not None:
@@ -584,36 +610,20 @@ def _gap_leaps(t_s: Numbers, gap: Numbers) -> Iterator[str]:
                 f"the gap jumps by {steps[k] * 1e3:.3g} mm within {seconds * 1e3:.3g} ms (at {t_s[k + 1]:.4g} s), "
                 "as no finger does: is it a glitch, or did its sensor stop before?"
             )
+            break
+    steps = np.abs(moved)
     # The steps of a coarse gap are alike.
     if LEAP * steps.min(initial=np.inf, where=steps > 0.0) < steps.max():
         yield from _seldom("the gap", t_s, gap, PART)
 
 
 def _stopped_gap(force: _Force) -> Iterator[str]:
-    """Yield that a gap (m) stays, by time (s), as the gap of a rigid object does, and yet does not end so.
-
-    It jumps to another value at once, and the force does not. Or it does not open, and the force is gone.
-    """
-    gap, n, runs = force.gap, force.n, _runs(force.gap)
-    # The gap can have fewer values than rows.
-    usual = int(np.median([end - begin for begin, end in runs]))
-    longest = max(FEWEST, LEAP * usual)
-    changes = np.abs(np.diff(gap[[begin for begin, _ in runs]])).tolist()
-    for k, (begin, end) in enumerate(runs[1:], 1):
-        if end - begin < longest or not np.ptp(n[begin:end]) > FREE * force.span:
-            continue
-        stays = (
-            f"the gap stays at {gap[begin] * 1e3:.4g} mm from {force.t[begin]:.4g} to {force.when(end - 1)}"
+    """Yield that a gap (m) stays to the end, by time (s), although the force changed and is gone."""
+    begin, end = _runs(force.gap)[-1]
+    longest = max(FEWEST, LEAP * float(np.median([end - begin for begin, end in _runs(force.gap)])))
+    changed = end - begin >= longest and np.ptp(force.n[begin:]) > FREE * force.span
+    if begin and changed and force.above(LOADED)[begin:].any() and not force.above(PART)[-1]:
+        yield (
+            f"the gap stays at {force.gap[begin] * 1e3:.4g} mm from {force.t[begin]:.4g} to {force.when(end - 1)}, "
+            "although the force is gone: did its sensor stop?"
         )
-        if end == len(gap):
-            if force.above(LOADED)[begin:].any() and not force.above(PART)[-1]:
-                yield f"{stays}, although the force is gone: did its sensor stop?"
-        elif end + usual < len(gap):
-            moves_on = end + longest > runs[k + 1][1] < len(gap)
-            around = max(changes[k - 1], changes[k + 1] if moves_on else 0.0)
-            calm = abs(float(n[end + usual - 1] - n[max(begin, end - usual)])) < PART * force.span
-            if changes[k] > max(LEAP * around, STOPPED_STEPS * min(changes)) and calm:
-                yield (
-                    f"{stays} while the force changes, and then jumps by {changes[k] * 1e3:.3g} mm: did its sensor "
-                    "stop?"
-                )

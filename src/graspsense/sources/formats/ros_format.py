@@ -91,8 +91,8 @@ def _collected(
         divided = 1 < len({names for names, *_ in messages if names}) <= MOST_NAMES
         for names, recorded_ns, stamped_ns, numbers in messages:
             part = f"{topic}.{names}" if divided and names else topic
-            values.setdefault(part, []).append({f"{part}{k}": value for k, value in numbers.items()})
-            times.setdefault(part, Messages()).add(recorded_ns, stamped_ns)
+            if times.setdefault(part, Messages()).add(recorded_ns, stamped_ns, numbers):
+                values.setdefault(part, []).append({f"{part}{k}": value for k, value in numbers.items()})
     values = {topic: value for topic, value in values.items() if value[0]}
     wanted = {topic for topic in values if any(name.startswith(f"{topic}.") for name in used)}
     # Of a topic that was divided, and named as a whole, the parts are shown.

@@ -35,8 +35,8 @@ from graspsense.sources.formats.text_table import (
     numbers_with_unit,
     read_lines,
     table_of,
-    unit_in,
 )
+from graspsense.sources.units import unit_in
 
 _Part = tuple[dict[str, str], Sequence[Line]]
 

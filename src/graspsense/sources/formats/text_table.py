@@ -56,8 +56,6 @@ _RULE: Final = re.compile(r"(?=.*(?:[-_=]{3}|:-|-:))[-_=+|:\s]+")
 """A line of signs below the names, or around a table."""
 _REMARKS: Final = frozenset({"comment", "comments", "remark", "remarks", "note", "notes"})
 """Names of a last column that can be without any cell."""
-_OF_TIME: Final = re.compile(r"\W*t\b|.*(time|elapsed|duration|clock|zeit|dauer)", re.IGNORECASE)
-"""A heading behind which these are units, and not the least one, a height or a diameter."""
 _KIND: Final = re.compile(
     "<?(?:continuous|c|discrete|d|string|s|time|t|u?int(?:eger)?|float|double|real|num(?:ber|eric)?|dbl)(?:8|16|32|64)?>?"
 )
@@ -514,14 +512,6 @@ def numbers_with_unit(cells: Sequence[str], of_column: str = "") -> tuple[Sequen
         numbers.append(match[1] if match else cell)
     known = unit.lower() in UNITS if len(unit) > 1 else unit in _SINGLE_UNITS
     return (numbers, unit) if known else (cells, of_column)
-
-
-def unit_in(heading: str) -> str:
-    """Return the unit behind a name: `Load [N]` or `Load (N)`. Only a time has minutes: `Load (min)` is the least."""
-    match = re.fullmatch(r"(.*)[\[(](.*)[\])]", heading)
-    unit = match[2].strip() if match else ""
-    symbol = match is not None and unit in ("min", "h", "d") and not _OF_TIME.match(match[1])
-    return unit if unit.lower() in UNITS and not symbol else ""
 
 
 def _json_table(path: Path, lines: Sequence[Line], ended: bool) -> TextTable:

@@ -8,12 +8,16 @@ stamped late, from one that is recorded at once.
 
 A value holds until the next message, but not longer than a few usual periods of its topic: a sensor that died has no
 value. Only the interval in which all topics have messages is used.
+
+A message that came before, with the same time in its header and the same numbers, is left out: two bridges, or two
+recordings that were joined, give each message twice.
 """
 
 from __future__ import annotations
 
+import pickle
 from collections.abc import Collection, Iterator, Mapping
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from attrs import field, frozen
@@ -67,11 +71,23 @@ class Messages:
 
     recorded_ns: list[int] = field(factory=list)
     stamped_ns: list[int] = field(factory=list)
+    _known: set[int] = field(factory=set, init=False)
 
-    def add(self, recorded_ns: int, stamped_ns: int) -> None:
-        """Add a message."""
+    def add(self, recorded_ns: int, stamped_ns: int, numbers: Any) -> bool:
+        """Add a message with these numbers; return False if it came before."""
+        message = hash((stamped_ns, pickle.dumps(numbers)))
+        if stamped_ns and message in self._known:
+            return False
+        self._known.add(message)
         self.recorded_ns.append(recorded_ns)
         self.stamped_ns.append(stamped_ns)
+        return True
+
+    @property
+    def least_delay_ns(self) -> int:
+        """The least delay from header to recording, of those whose headers have a time."""
+        pairs = zip(self.recorded_ns, self.stamped_ns, strict=True)
+        return min(came - stamp for came, stamp in pairs if stamp)
 
 
 @frozen(kw_only=True, eq=False)
@@ -157,8 +173,9 @@ def common_clock(
     Raises DataDamaged if there is no time at which all topics have messages, or if times do not fit into 64 bits.
     """
     began_ns, times, notices = on_one_clock(source, topics)
-    delays = {} if notices else _delays({topic: topics[topic] for topic in needed or topics})
     wanted = {topic: times[topic] for topic in needed or times}
+    stamped = () if notices else (topic for topic in wanted if any(topics[topic].stamped_ns))
+    delays = {topic: topics[topic].least_delay_ns for topic in stamped}
     lasting = {topic: stamps for topic, stamps in wanted.items() if stamps.usual_ns} or wanted
     begin = max(int(stamps.ns[0]) for stamps in lasting.values())
     end = min(stamps.until_ns for stamps in lasting.values())
@@ -236,17 +253,6 @@ def _apart(stamped: Mapping[str, Nanoseconds], recorded: Mapping[str, Nanosecond
         yield (
             f"the times in the headers of {behind} are behind those of another topic, from another clock: {used}"
         )
-
-
-def _delays(topics: Mapping[str, Messages]) -> dict[str, int]:
-    """Return the least delay from header to recording of each topic whose headers have times (ns)."""
-    every = {
-        topic: [
-            came - stamp for came, stamp in zip(times.recorded_ns, times.stamped_ns, strict=True) if stamp
-        ]
-        for topic, times in topics.items()
-    }
-    return {topic: min(delays) for topic, delays in every.items() if delays}
 
 
 def _drifting(duration_ns: int, least: Mapping[str, list[int]]) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import Any, Final
 
@@ -16,6 +15,7 @@ from graspsense.core.values.trace import SI_UNITS, ImageTrace, signals_of
 from graspsense.recording.labelled_recording import LabelledRecording
 from graspsense.recording.replayable import Recording
 from graspsense.sources.columns.channel_facts import ChannelFacts, channel_facts, together
+from graspsense.sources.columns.recording_notices import notices_together
 from graspsense.sources.formats.table import Numbers
 
 CHANNEL_OF: Final = {
@@ -55,7 +55,7 @@ class ImportSummary:
     notes: tuple[str, ...]
     """How the first recording came about."""
     notices: tuple[tuple[str, int], ...]
-    """What looks wrong, and in how many recordings."""
+    """What looks wrong, and in how many recordings; an example of what differs in its numbers alone."""
     measured: tuple[ChannelFacts, ...]
     """What the samples of each channel show, in all recordings together; lengths in m."""
 
@@ -63,7 +63,6 @@ class ImportSummary:
 def summary_of(recordings: Sequence[LabelledRecording]) -> ImportSummary:
     """Return the summary of at least one recording."""
     by_label: dict[str, list[LabelledRecording]] = {}
-    notices = Counter(notice for recording in recordings for notice in recording.notices)
     for recording in recordings:
         by_label.setdefault(recording.label, []).append(recording)
     earliest = recordings[0].recording
@@ -76,7 +75,7 @@ def summary_of(recordings: Sequence[LabelledRecording]) -> ImportSummary:
         values=tuple(dict.fromkeys(name for recording in recordings for name in recording.values)),
         recorded=(times[0], times[-1]) if times[0] else None,
         notes=earliest.notes,
-        notices=tuple(notices.most_common()),
+        notices=notices_together(recordings),
         measured=_measured([recording.recording for recording in recordings]),
     )
 

@@ -15,6 +15,8 @@ from pathlib import Path
 from typing import Final
 from urllib.parse import parse_qsl, urlencode
 
+from attrs import evolve
+
 from graspsense.core.values.errors import ConfigError, DataDamaged, suggestion
 from graspsense.recording.export_trace import declared_beside
 from graspsense.recording.replayable import Recording
@@ -24,6 +26,7 @@ from graspsense.sources.formats.text_format import read_text
 from graspsense.sources.manifest.description import QUANTITIES as MAPPED
 from graspsense.sources.manifest.description import Manifest, ReadManifest
 from graspsense.sources.manifest.expression import Expression, ExpressionError, parse
+from graspsense.sources.manifest.notices import notices_of
 from graspsense.sources.manifest.samples import samples
 from graspsense.sources.recordings.exported_grasp import read_exported, refuse_table_of_store
 
@@ -81,7 +84,8 @@ def read_squeeze(name: str) -> Recording:
         keys=Manifest(),
         expressions={quantity: tuple((given | sides).get(quantity, ())) for quantity in MAPPED},
     )
-    return checked_recording(samples(described, tables[0]))
+    columns = samples(described, tables[0])
+    return evolve(checked_recording(columns), notices=tuple(notices_of(columns, described.keys)))
 
 
 def _expression(table: ColumnTable, quantity: str, text: str) -> Expression:

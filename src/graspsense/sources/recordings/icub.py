@@ -172,10 +172,9 @@ def _numbers(path: Path, number: int, line: str, what: str, count: int) -> list[
     values = []
     for word in words:
         value = number_in(word)
-        if value is None:
-            raise _damaged(path, number, f"{what} value {word[:40]!r} is not a number")
-        if not lowest <= value <= highest:
-            raise _damaged(path, number, f"{what} value {word[:40]} is outside {lowest:g} to {highest:g}")
+        if value is None or not lowest <= value <= highest:
+            why = "is not a number" if value is None else f"is outside {lowest:g} to {highest:g}"
+            raise _damaged(path, number, f"{what} value {word[:40]!r} {why}")
         values.append(value)
     return values
 

@@ -118,9 +118,8 @@ class _Messages:
             value: Any = [(sample.x, sample.y, sample.z) for sample in message.samples]
         else:
             value = _tips(self.path, message) if topic == self.pressure else _motion(message, self.joint)
-        if value is not None:
+        if value is not None and self.times[topic].add(recorded_ns, stamp_ns(message), value):
             self.values[topic].append(value)
-            self.times[topic].add(recorded_ns, stamp_ns(message))
 
 
 def _recording(path: Path, messages: _Messages) -> Recording:
