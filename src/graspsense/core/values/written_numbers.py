@@ -41,11 +41,11 @@ _MISSING_WORDS: Final = frozenset({
     "nothing", "nil", "(null)", "no data", "n.d.", "k.a.", "undef"
 })  # fmt: skip
 _MISSING: Final = re.compile(
-    r"[-+]?(?:nan(?:\(\w*\)|0x[0-9a-f]+)?|1[.,]#(?:q?nan|ind)\d*)|#[^\W\d][^!?]*[!?]|#[\u00a1\u00bf].*|#n/?[adv]|err:\d{3}|\.[a-z]",
+    r"\*{4,}|[-+]?(?:nan(?:\(\w*\)|0x[0-9a-f]+)?|1[.,]#(?:q?nan|ind)\d*)|#[^\W\d][^!?]*[!?]|#[\u00a1\u00bf].*|#n/?[adv]|err:\d{3}|\.[a-z]",
     re.IGNORECASE,
 )
-"""NaN as the libraries of C write it, the errors of spreadsheets in their languages, such as `#WERT!`, and `.a` of
-Stata."""
+"""Stars, as Fortran writes a number that is too wide, NaN as the libraries of C write it, the errors of spreadsheets in
+their languages, such as `#WERT!`, and `.a` of Stata."""
 _LONGEST_MISSING: Final = 20
 
 _LOGICAL: Final = {"True": "1", "False": "0", "Wahr": "1", "Falsch": "0", "Vrai": "1", "Faux": "0"}

@@ -123,7 +123,7 @@ def _columns(path: Path, fields: dict[str, str], table: TextTable, *, several: b
         plain, units[name] = numbers_with_unit(cells[name], units[name])
         if plain is not cells[name]:
             texts[name], cells[name] = cells[name], plain
-    read = columns_of_numbers(cells)
+    read = columns_of_numbers(cells, decimal_commas=table.separator == ";")
     for name, column in read.items():
         if not isinstance(column, NotNumbers):
             numbers[name] = column

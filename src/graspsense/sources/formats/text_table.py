@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 import re
 import unicodedata
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Sequence
 from itertools import chain, compress, pairwise, takewhile
 from operator import itemgetter, lt
 from pathlib import Path
@@ -63,6 +64,14 @@ _KIND: Final = re.compile(
 )
 """The kind of a column in a line below the names, as Orange and other programs write it, in small letters."""
 _SEPARATOR_LINE: Final = re.compile(r'"?sep=([;,\t|])"?\s*')
+_WHOLE_LINES: Final = (re.compile(r"\s*\|.*\|\s*"), re.compile(r'\s*"(?:[^"]|"")*"\s*'))
+"""Lines in bars, as of Markdown, and lines that are a cell in quotes, as a spreadsheet saves what it has not divided."""
+_APOSTROPHES: Final = re.compile(r"\s*'[^']*'(?:\s*[;,\t|]\s*'[^']*')+\s*")
+"""Names in apostrophes in place of quotes."""
+_QUOTED_NUMBER: Final = re.compile(r'"\d+"[;,\t ](?:.*[;,\t ])?[-+.\d]')
+"""A number in quotes, as R writes the name of a row, before one without them."""
+_REMARK: Final = re.compile(r"\s(?:#|%|//|!)\s*\S")
+"""The beginning of a comment behind cells."""
 _SPREADSHEETS: Final = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
 """The first bytes of a ZIP file, as which spreadsheets are saved, and of those of old programs."""
 _BINARY: Final = (*_SPREADSHEETS, b"PAR1", b"ARROW1")
@@ -140,7 +149,7 @@ def table_of(path: Path, lines: Sequence[Line], *, ended: bool = True) -> TextTa
     """
     if text_suffix(path) in JSON_LINES:
         return _json_table(path, lines, ended)
-    return _Layout(path, lines).table(ended)
+    return _Layout(path, lines, ended).table()
 
 
 def text_suffix(path: Path) -> str:
@@ -152,7 +161,7 @@ def text_suffix(path: Path) -> str:
 class _Layout:
     """How the lines of a file are laid out."""
 
-    def __init__(self, path: Path, lines: Sequence[Line]) -> None:
+    def __init__(self, path: Path, lines: Sequence[Line], ended: bool) -> None:
         self.path = path
         self.notes: list[str] = []
         written = [(number, line) for number, line in lines if line.strip()]
@@ -161,13 +170,18 @@ class _Layout:
             written = written[1:]
         self.shown_as_it_is = any('="' in line for _, line in written)
         self.comments, plain = _comments_and_others(written)
-        if all(re.fullmatch(r"\s*\|.*\|\s*", line) for _, line in plain):
-            plain = [(number, line.strip()[1:-1]) for number, line in plain]
+        for whole in _WHOLE_LINES:
+            if all(whole.fullmatch(line) for _, line in plain):
+                plain = [(number, line.strip()[1:-1].replace('""', '"')) for number, line in plain]
+        self.quote = "'" if any(_APOSTROPHES.fullmatch(line) for _, line in plain[:_FEW_BEFORE]) else '"'
         self.separator = given[1] if given else _separator([line for _, line in _sample(plain)])
+        plain = self._without_remarks(plain)
+        self.numbered = {number for number, line in plain if _QUOTED_NUMBER.match(line)}
+        self.ended = ended
         self.blank: list[int] = []
         self.rows = _with_remarks(self._checked(self._rows(plain)))
 
-    def table(self, ended: bool) -> TextTable:
+    def table(self) -> TextTable:
         """Return the table. Raises DataDamaged."""
         if not self.rows:
             return TextTable(names=(), units=(), columns=(), lines=())
@@ -176,9 +190,10 @@ class _Layout:
         rows = self._without_repeats(self.rows[begin:], names, units)
         rows = self._without_texts(rows, len(names))
         rows = [(number, row if any(row[len(names) :]) else row[: len(names)]) for number, row in rows]
-        if names[0] and _begin_with_names(rows, len(names) + 1):
-            names, units = ["", *names], ["", *units] if units else None
-        rows = self._without_cut(rows, len(names), ended)
+        named = names[: -1 if line in self.separated else None]
+        if names[0] and _begin_with_names(rows, len(named) + 1, self.numbered):
+            names, units = ["", *named], ["", *units] if units else None
+        rows = self._without_cut(rows, len(names))
         for number, row in rows:
             if len(row) != len(names):
                 raise DataDamaged(
@@ -197,6 +212,23 @@ class _Layout:
             separator=self.separator,
         )
 
+    def _without_remarks(self, lines: list[Line]) -> list[Line]:
+        """Return the lines without the comments that some have behind their cells."""
+        width, _ = _width([line for _, line in _sample(lines)], self.separator)
+        shorter: dict[int, str] = {}
+        for number, line in lines:
+            if (remark := _REMARK.search(line)) is None:
+                continue
+            cells, text = line[: remark.start()].rstrip(f"{self.separator} "), _split(line, self.separator)
+            short = _split(cells, self.separator)
+            outside = cells.endswith(self.quote) or (is_number(short[-1]) and not is_number(text[-1]))
+            if len(short) == width and (len(text) != width or outside):
+                shorter[number] = cells
+        if not 0 < 2 * len(shorter) < len(lines):
+            return lines
+        self._tell(shorter, "comment behind cells")
+        return [(number, shorter.get(number, line)) for number, line in lines]
+
     def _rows(self, lines: Sequence[Line]) -> Iterator[Row]:
         """Yield the cells of each line; a cell in quotes may go over several lines. Raises DataDamaged."""
         if self.separator in _SPACES:
@@ -204,16 +236,25 @@ class _Layout:
                 yield number, _split(line, self.separator)
             return
         reader = csv.reader(
-            (line + "\n" for _, line in lines), delimiter=self.separator, skipinitialspace=True, strict=True
+            (line + "\n" for _, line in lines),
+            delimiter=self.separator,
+            quotechar=self.quote,
+            skipinitialspace=True,
+            strict=True,
         )
+        whole = 0
         try:
             for row in reader:
                 cells = list(map(str.strip, row))
                 if self.shown_as_it_is:
                     cells = [_SHOWN_AS_IT_IS.sub(r"\1", cell) for cell in cells]
-                yield lines[reader.line_num - 1][0], cells
+                whole = reader.line_num
+                yield lines[whole - 1][0], cells
         except (csv.Error, ValueError) as error:
             number = lines[max(0, min(reader.line_num, len(lines)) - 1)][0]
+            if not self.ended and 0 < whole == len(lines) - 1:
+                self.notes.append(f"line {number} is cut off, and left out")
+                return
             raise DataDamaged(f"{self.path}, line {number}: {error}") from None
 
     def _checked(self, rows: Iterator[Row]) -> list[Row]:
@@ -231,9 +272,10 @@ class _Layout:
                 too_many = COLUMNS.exceeded(len(row)) or CELLS.exceeded(cells)
                 raise DataDamaged(f"{self.path}, line {number}: {too_many}")
             kept.append((number, row))
-        used = max((len(row) for _, row in kept), default=0)
+        used = longest = max((len(row) for _, row in kept), default=0)
         while used and not any(any(row[used - 1 :]) for _, row in kept):
             used -= 1
+        self.separated = {number for number, row in kept if len(row) == used == longest - 1 and not row[-1]}
         return [(number, row[:used]) for number, row in kept]
 
     def _header(self) -> _Header:
@@ -250,7 +292,7 @@ class _Layout:
         if data is not None and (names := self._second_names(data, width, numeric)):
             return self._header_before(names + 1, width, numeric)
         if data is None or (data == 1 and len(top) > max(1, width - 2) and not _are_numbers(top)):
-            return _Header(top, None, 1, line)
+            return (self._better_names(width, data) if data else None) or _Header(top, None, 1, line)
         named = data == 0 and not (_are_numbers(top) or self._is_as_below(top, numeric))
         if named and not self._names_in_comment(width, 0):
             return _Header(top, None, 1, line)
@@ -268,29 +310,32 @@ class _Layout:
             kinds = {cell.lower() for c, cell in enumerate(self.rows[k][1]) if c in numeric} - {""}
             named = any(len(kind) > 1 for kind in kinds) or ("c" in kinds and self.rows[k + 1 : data])
             if named and all(map(_KIND.fullmatch, kinds)):
-                self._tell([number for number, _ in self.rows[k:data]], "line on the kinds of columns")
-                del self.rows[k:data]
+                told = [row for _, row in self.rows[k:data]]
+                self._tell((number for number, row in self.rows if row in told), "line on the kinds of columns")
+                self.rows = [line for line in self.rows if line[1] not in told]
                 return k
         return data
 
     def _second_names(self, data: int, width: int, numeric: frozenset[int]) -> int | None:
         """Return the last row of names behind a few rows of numbers, as those of a summary; None if there is none."""
-        most = data + max(_FEW_BEFORE, int(_MOST_BEFORE * len(self.rows)))
+        most = max(_FEW_BEFORE, int(_MOST_BEFORE * len(self.rows)))
+        near = pairwise(self.rows[data + 1 : data + 2 * most + 2])
         named = [
             k
-            for k, ((_, row), (_, following)) in enumerate(pairwise(self.rows[data + 1 : most + 2]), data + 1)
+            for k, ((_, row), (_, following)) in enumerate(near, data + 1)
             if len(row) > 1
             and not any(is_number(row[c]) or is_missing(row[c]) for c in numeric if c < len(row))
             and _can_be_names(row, width, [set()] * width)
             and all(row != earlier for _, earlier in self.rows[:data])
             and _is_data(following, width, numeric)
+            and sum(_is_data(above, width, numeric) for _, above in self.rows[data:k]) <= most
         ]
         return named[-1] if named else None
 
     def _header_before(self, data: int, width: int, numeric: frozenset[int]) -> _Header:
         """Return where the names are if `data` rows come before the numbers. Raises DataDamaged if none has names."""
-        if joined := self._joined_names(data, width):
-            return joined
+        if better := self._better_names(width, data) or self._joined_names(data, width):
+            return better
         head = [row for _, row in self.rows[:data]]
         below = [row for _, row in self.rows[data:] if row not in head]
         texts = [set() if k in numeric else {row[k] for row in below if k < len(row)} for k in range(width)]
@@ -305,7 +350,7 @@ class _Layout:
             and len(self.rows[k][1]) <= len(self.rows[k + 1][1])
             and _are_units(self.rows[k + 1][1])
             and not _are_units(self.rows[k][1])
-            and {*range(k + 2, data)} <= {*able}
+            and not any(is_number(cell) for _, row in self.rows[k + 2 : data] for cell in row)
         ]
         names = (with_units or able)[-1]
         above = self.rows[names - 1][1] if names and not with_units else []
@@ -381,6 +426,14 @@ class _Layout:
                 'or say in a manifest which line begins each grasp: start = "a text in that line"'
             )
 
+    def _better_names(self, width: int, data: int) -> _Header | None:
+        """Return the names in a comment, None if the row before the numbers has a name for each column, or for R's."""
+        row = self.rows[data - 1][1] if data else []
+        named = len(row) == width and not any(map(is_number, row))
+        if data == 0 or named or _begin_with_names(self.rows[data:], width, self.numbered):
+            return None
+        return self._names_in_comment(width, data)
+
     def _names_in_comment(self, width: int, data: int) -> _Header | None:
         """Return the names and the units that comments before this row have; None if none has names.
 
@@ -400,7 +453,7 @@ class _Layout:
 
     def _cells(self, comment: str, width: int) -> list[str]:
         """Return the names in a text, which may separate so many words by another sign than the rows do."""
-        text = comment.strip().lstrip("#%/! ")
+        text = comment.lstrip("#%/! \t").rstrip(";,|\t ")
         for separator in _SEPARATORS if self.separator in _SPACES else _SEPARATORS[: -len(_SPACES)]:
             cells = _split(text, separator)
             whole = separator == self.separator or not any(" " in cell for cell in cells)
@@ -431,7 +484,11 @@ class _Layout:
         sample = _sample([row for _, row in rows])
         numeric = _numeric_columns(sample, width)
         rises = 0 in numeric and _rise([row[0] for row in sample if is_number(row[0])])
-        behind = takewhile(lambda row: _is_text_behind(row[1], width, numeric, rises=rises), reversed(rows))
+        apart = max((line for (above, _), (line, _) in pairwise(rows) if line > above + 1), default=math.inf)
+        apart = apart if 0 in numeric else math.inf
+        behind = takewhile(
+            lambda row: _is_text_behind(row[1], width, numeric, rises=rises or row[0] >= apart), reversed(rows)
+        )
         texts = {number for number, row in rows if len(row) < width and not any(map(is_number, row))}
         texts |= {number for number, _ in behind}
         if not 0 < len(texts) <= max(_FEW_BEFORE, _MOST_BEFORE * len(rows)):
@@ -439,9 +496,9 @@ class _Layout:
         self._tell(texts, "line of text")
         return [row for row in rows if row[0] not in texts]
 
-    def _without_cut(self, rows: list[Row], width: int, ended: bool) -> list[Row]:
+    def _without_cut(self, rows: list[Row], width: int) -> list[Row]:
         """Return the rows without a last one that was cut off while it was written."""
-        if ended or len(rows) < 4:
+        if self.ended or len(rows) < 4:
             return rows
         number, last = rows[-1]
         ends = [row[-1] for _, row in rows[:-1] if len(row) == width]
@@ -482,16 +539,19 @@ def _with_remarks(rows: list[Row]) -> list[Row]:
     return [(number, [*row, ""] if len(row) == width - 1 else row) for number, row in rows]
 
 
-def _begin_with_names(rows: Sequence[Row], width: int) -> bool:
+def _begin_with_names(rows: Sequence[Row], width: int, in_quotes: Container[int]) -> bool:
     """Return whether all rows have so many cells, and number or name themselves in the first, as those of R do.
 
-    Numbers that R has sorted are in another order; from the last to the first, they can be measured.
+    Numbers that R has sorted are in another order; from the last to the first, they can be measured. Of a part of
+    the rows, they are names if they alone are `in_quotes`, in these lines.
     """
     names, n = [row[0] for _, row in rows if len(row) == width], len(rows)
     if len(set(names)) < max(n, 2):
         return False
     if not any(map(is_number, names)):
         return n > _FEW_BEFORE
+    if all(number in in_quotes for number, _ in rows):
+        return True
     counted = {*names} in ({*map(str, range(n))}, {*map(str, range(1, n + 1))})
     return counted and names != sorted(names, key=int, reverse=True)
 
