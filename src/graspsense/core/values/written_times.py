@@ -26,9 +26,7 @@ _MONTHS: Final = [
     "aug|ao[u\u00fb]|ago", "se[pt]", "o[ck]t|ott|out", "nov", "d[e\u00e9][cz]|dic",
 ]  # fmt: skip
 """How the names of the months begin in English, German, French, Spanish, Italian, Dutch and Portuguese."""
-_MONTH: Final = re.compile(
-    rf"(?<=\d)\.?[- ](?:({')|('.join(_MONTHS)}))[^\W\d]*\.?[- ]", re.IGNORECASE
-)
+_MONTH: Final = re.compile(rf"(?<=\d)\.?[- ](?:({')|('.join(_MONTHS)}))[^\W\d]*\.?[- ]", re.IGNORECASE)
 _MINUTES: Final = re.compile(r"[0-5]?[0-9]:[0-5][0-9][.,][0-9]{1,9}")
 """Minutes and seconds; without a fraction they can be hours and minutes."""
 _DAY_S: Final = 86_400.0

@@ -66,11 +66,11 @@ _KIND: Final = re.compile(
 _SEPARATOR_LINE: Final = re.compile(r'"?sep=([;,\t|])"?\s*')
 _WHOLE_LINES: Final = (re.compile(r"\s*\|.*\|\s*"), re.compile(r'\s*"(?:[^"]|"")*"\s*'))
 """Lines in bars, as of Markdown, and lines that are a cell in quotes, as a spreadsheet saves what it has not divided."""
-_APOSTROPHES: Final = re.compile(r"\s*'[^']*'(?:\s*[;,\t|]\s*'[^']*')+\s*")
+_APOSTROPHES: Final = re.compile(r"[;,\t|]? *'[^']*' *(?:[;,\t|] *'[^']*' *)+[;,\t|]?")
 """Names in apostrophes in place of quotes."""
-_QUOTED_NUMBER: Final = re.compile(r'"\d+"[;,\t ](?:.*[;,\t ])?[-+.\d]')
+_QUOTED_NUMBER: Final = re.compile(r'"\d+"[;,\t| ](?:.*[;,\t| ])?[-+.\d]')
 """A number in quotes, as R writes the name of a row, before one without them."""
-_REMARK: Final = re.compile(r"\s(?:#|%|//|!)\s*\S")
+_REMARK: Final = re.compile(r"\s(?:#|%|//|!)\s*[^\s\d]")
 """The beginning of a comment behind cells."""
 _SPREADSHEETS: Final = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
 """The first bytes of a ZIP file, as which spreadsheets are saved, and of those of old programs."""
@@ -174,7 +174,7 @@ class _Layout:
             if all(whole.fullmatch(line) for _, line in plain):
                 plain = [(number, line.strip()[1:-1].replace('""', '"')) for number, line in plain]
         self.quote = "'" if any(_APOSTROPHES.fullmatch(line) for _, line in plain[:_FEW_BEFORE]) else '"'
-        self.separator = given[1] if given else _separator([line for _, line in _sample(plain)])
+        self.separator = given[1] if given else _separator([line for _, line in _sample(plain)], self.quote)
         plain = self._without_remarks(plain)
         self.numbered = {number for number, line in plain if _QUOTED_NUMBER.match(line)}
         self.ended = ended
@@ -191,7 +191,7 @@ class _Layout:
         rows = self._without_texts(rows, len(names))
         rows = [(number, row if any(row[len(names) :]) else row[: len(names)]) for number, row in rows]
         named = names[: -1 if line in self.separated else None]
-        if names[0] and _begin_with_names(rows, len(named) + 1, self.numbered):
+        if names[0] and _begin_with_names(rows if self.ended else rows[:-1], len(named) + 1, self.numbered):
             names, units = ["", *named], ["", *units] if units else None
         rows = self._without_cut(rows, len(names))
         for number, row in rows:
@@ -214,15 +214,19 @@ class _Layout:
 
     def _without_remarks(self, lines: list[Line]) -> list[Line]:
         """Return the lines without the comments that some have behind their cells."""
-        width, _ = _width([line for _, line in _sample(lines)], self.separator)
+        remarks = {number: match.start() for number, line in lines if (match := _REMARK.search(line))}
+        ends = {_last(line, self.separator) for number, line in lines if number not in remarks}
+        width, _ = _width([line for _, line in _sample(lines)], self.separator, self.quote)
         shorter: dict[int, str] = {}
-        for number, line in lines:
-            if (remark := _REMARK.search(line)) is None:
-                continue
-            cells, text = line[: remark.start()].rstrip(f"{self.separator} "), _split(line, self.separator)
-            short = _split(cells, self.separator)
-            outside = cells.endswith(self.quote) or (is_number(short[-1]) and not is_number(text[-1]))
-            if len(short) == width and (len(text) != width or outside):
+        for number, line in lines if remarks else ():
+            cells = line[: remarks.get(number)].rstrip(f"{self.separator} ")
+            widths = [len(_split(text, self.separator, self.quote)) for text in (cells, line)]
+            end = _last(cells, self.separator)
+            if (
+                number in remarks
+                and widths[0] == width
+                and (widths[1] != width or is_number(end) or end in ends)
+            ):
                 shorter[number] = cells
         if not 0 < 2 * len(shorter) < len(lines):
             return lines
@@ -254,6 +258,7 @@ class _Layout:
             number = lines[max(0, min(reader.line_num, len(lines)) - 1)][0]
             if not self.ended and 0 < whole == len(lines) - 1:
                 self.notes.append(f"line {number} is cut off, and left out")
+                self.ended = True
                 return
             raise DataDamaged(f"{self.path}, line {number}: {error}") from None
 
@@ -311,7 +316,9 @@ class _Layout:
             named = any(len(kind) > 1 for kind in kinds) or ("c" in kinds and self.rows[k + 1 : data])
             if named and all(map(_KIND.fullmatch, kinds)):
                 told = [row for _, row in self.rows[k:data]]
-                self._tell((number for number, row in self.rows if row in told), "line on the kinds of columns")
+                self._tell(
+                    (number for number, row in self.rows if row in told), "line on the kinds of columns"
+                )
                 self.rows = [line for line in self.rows if line[1] not in told]
                 return k
         return data
@@ -487,7 +494,8 @@ class _Layout:
         apart = max((line for (above, _), (line, _) in pairwise(rows) if line > above + 1), default=math.inf)
         apart = apart if 0 in numeric else math.inf
         behind = takewhile(
-            lambda row: _is_text_behind(row[1], width, numeric, rises=rises or row[0] >= apart), reversed(rows)
+            lambda row: _is_text_behind(row[1], width, numeric, rises=rises or row[0] >= apart),
+            reversed(rows),
         )
         texts = {number for number, row in rows if len(row) < width and not any(map(is_number, row))}
         texts |= {number for number, _ in behind}
@@ -639,13 +647,13 @@ def _sample(lines: Sequence[Any]) -> list[Any]:
     return [*lines[:half], *lines[half :: max(1, (len(lines) - half) // half)]]
 
 
-def _separator(lines: Sequence[str]) -> str:
+def _separator(lines: Sequence[str], quote: str) -> str:
     """Return what separates the cells of these lines: a semicolon, a tab, a comma, a bar, or any number of spaces.
 
     It gives most lines, and so their names, the same number of cells. In a single column it is a sign that no text has:
     the name may have spaces.
     """
-    widths = {separator: _width(lines, separator) for separator in _SEPARATORS}
+    widths = {separator: _width(lines, separator, quote) for separator in _SEPARATORS}
     agreeing = {separator: count for separator, (width, count) in widths.items() if width > 1}
     signs = {separator: count for separator, count in agreeing.items() if separator.strip(" ")}
     between = (2 * sum(map(is_number, words)) > len(words) for words in (_split(line, " ") for line in lines))
@@ -657,14 +665,20 @@ def _separator(lines: Sequence[str]) -> str:
     return max(agreeing, key=lambda separator: agreeing[separator], default="\x1f")
 
 
-def _split(line: str, separator: str) -> list[str]:
+def _last(line: str, separator: str) -> str:
+    """Return the last cell of a line that has no quotes."""
+    return line.rstrip(separator).rpartition(separator.strip(" ") or " ")[2].strip(" \"'")
+
+
+def _split(line: str, separator: str, quote: str = '"') -> list[str]:
     """Return the cells of a line; none if it cannot be divided. Spaces within quotes are of their word."""
     if separator == "  ":
         return [word.strip('"') for word in re.split(r"\s{2,}", line.strip())]
     if separator == " ":
         return [quoted or word for quoted, word in re.findall(r'"([^"]*)"(?!\S)|(\S+)', line)]
     try:
-        return [*map(str.strip, next(csv.reader([line], delimiter=separator, skipinitialspace=True), []))]
+        rows = csv.reader([line], delimiter=separator, quotechar=quote, skipinitialspace=True, strict=True)
+        return [*map(str.strip, next(rows, []))]
     except (csv.Error, ValueError):
         return []
 
@@ -674,11 +688,11 @@ def _are_numbers(cells: Sequence[str]) -> bool:
     return all(is_number(cell) or is_missing(cell) for cell in cells)
 
 
-def _width(lines: Sequence[str], separator: str) -> tuple[int, int]:
+def _width(lines: Sequence[str], separator: str, quote: str) -> tuple[int, int]:
     """Return the most frequent number of cells of a line, without separators at its end, and how many lines have it."""
     short = [line.rstrip(separator) for line in lines]
     widths = Counter(
-        len(_split(text if separator in text else line, separator))
+        len(_split(text if separator in text else line, separator, quote))
         for text, line in zip(short, lines, strict=True)
     )
     return max(widths.items(), key=itemgetter(1), default=(1, 0))
