@@ -14,6 +14,7 @@ import re
 import unicodedata
 from collections import Counter
 from collections.abc import Container, Iterable, Iterator, Sequence
+from functools import partial
 from itertools import chain, compress, pairwise, takewhile
 from operator import itemgetter, lt
 from pathlib import Path
@@ -60,12 +61,13 @@ _REMARKS: Final = frozenset({"comment", "comments", "remark", "remarks", "note",
 _OF_TIME: Final = re.compile(r"\W*t\b|.*(time|elapsed|duration|clock|zeit|dauer)", re.IGNORECASE)
 """A heading behind which these are units, and not the least one, a height or a diameter."""
 _KIND: Final = re.compile(
-    "<?(?:continuous|c|discrete|d|string|s|time|t|u?int(?:eger)?|float|double|real|num(?:ber|eric)?|dbl)(?:8|16|32|64)?>?"
+    "<?(?:continuous|c|discrete|d|string|str|s|(?:var)?char|text|object|time|t|u?int(?:eger)?|float|double|real"
+    "|num(?:ber|eric)?|dbl)(?:8|16|32|64)?>?"
 )
 """The kind of a column in a line below the names, as Orange and other programs write it, in small letters."""
 _SEPARATOR_LINE: Final = re.compile(r'"?sep=([;,\t|])"?\s*')
 _WHOLE_LINES: Final = (re.compile(r"\s*\|.*\|\s*"), re.compile(r'\s*"(?:[^"]|"")*"\s*'))
-"""Lines in bars, as of Markdown, and lines that are a cell in quotes, as a spreadsheet saves what it has not divided."""
+"""Lines in bars, as of Markdown, and in quotes, as a spreadsheet saves what it has not divided."""
 _APOSTROPHES: Final = re.compile(r"[;,\t|]? *'[^']*' *(?:[;,\t|] *'[^']*' *)+[;,\t|]?")
 """Names in apostrophes in place of quotes."""
 _QUOTED_NUMBER: Final = re.compile(r'"\d+"[;,\t| ](?:.*[;,\t| ])?[-+.\d]')
@@ -124,6 +126,8 @@ class _Header(NamedTuple):
     units: list[str] | None
     begin: int
     line: int
+    beside: list[str] | None = None
+    """The row beside the names that has units or the kinds of the columns."""
 
 
 def read_lines(path: Path, start: str = "") -> tuple[list[Line], bool]:
@@ -185,9 +189,9 @@ class _Layout:
         """Return the table. Raises DataDamaged."""
         if not self.rows:
             return TextTable(names=(), units=(), columns=(), lines=())
-        names, units, begin, line = self._header()
+        names, units, begin, line, beside = self._header()
         check_columns(self.path, names)
-        rows = self._without_repeats(self.rows[begin:], names, units)
+        rows = self._without_repeats(self.rows[begin:], names, beside)
         rows = self._without_texts(rows, len(names))
         rows = [(number, row if any(row[len(names) :]) else row[: len(names)]) for number, row in rows]
         named = names[: -1 if line in self.separated else None]
@@ -214,23 +218,21 @@ class _Layout:
 
     def _without_remarks(self, lines: list[Line]) -> list[Line]:
         """Return the lines without the comments that some have behind their cells."""
-        remarks = {number: match.start() for number, line in lines if (match := _REMARK.search(line))}
-        ends = {_last(line, self.separator) for number, line in lines if number not in remarks}
+        begins = {number: match.start() for number, line in lines if (match := _REMARK.search(line))}
+        if not 0 < 2 * len(begins) < len(lines):
+            return lines
+        split = partial(_split, separator=self.separator, quote=self.quote)
+        ends = {cells[-1] for number, line in lines if number not in begins and (cells := split(line))}
         width, _ = _width([line for _, line in _sample(lines)], self.separator, self.quote)
         shorter: dict[int, str] = {}
-        for number, line in lines if remarks else ():
-            cells = line[: remarks.get(number)].rstrip(f"{self.separator} ")
-            widths = [len(_split(text, self.separator, self.quote)) for text in (cells, line)]
-            end = _last(cells, self.separator)
-            if (
-                number in remarks
-                and widths[0] == width
-                and (widths[1] != width or is_number(end) or end in ends)
+        for number, line in lines:
+            text = line[: begins.get(number)].rstrip(f"{self.separator} ")
+            cells = split(text) if number in begins else []
+            if len(cells) == width and (
+                len(split(line)) != width or is_number(cells[-1]) or cells[-1] in ends
             ):
-                shorter[number] = cells
-        if not 0 < 2 * len(shorter) < len(lines):
-            return lines
-        self._tell(shorter, "comment behind cells")
+                shorter[number] = text
+        self._tell(shorter, "line with a comment behind its cells")
         return [(number, shorter.get(number, line)) for number, line in lines]
 
     def _rows(self, lines: Sequence[Line]) -> Iterator[Row]:
@@ -293,35 +295,25 @@ class _Layout:
             self.rows[0] = (line, top)
         numeric = _numeric_columns(sample[: max(2, _SAMPLED_SIZE // width)], width)
         data = next((k for k, (_, row) in enumerate(self.rows) if _is_data(row, width, numeric)), None)
-        data = self._without_kinds(data, numeric)
-        if data is not None and (names := self._second_names(data, width, numeric)):
-            return self._header_before(names + 1, width, numeric)
-        if data is None or (data == 1 and len(top) > max(1, width - 2) and not _are_numbers(top)):
-            return (self._better_names(width, data) if data else None) or _Header(top, None, 1, line)
-        named = data == 0 and not (_are_numbers(top) or self._is_as_below(top, numeric))
-        if named and not self._names_in_comment(width, 0):
+        if data is None:
             return _Header(top, None, 1, line)
-        return self._header_before(data, width, numeric)
+        if names := self._second_names(data, width, numeric):
+            data = names + 1
+        above = self._names_in_comments(width, self.rows[data][0])
+        self.rows = sorted([*self.rows, *above])
+        header = self._joined_names(data + len(above), width) or self._names_in_row(
+            data + len(above), width, numeric
+        )
+        likely = len(top) > max(1, width - 2) if data else not self._is_as_below(top, numeric)
+        if header is None and data < 2 and likely and not _are_numbers(top):
+            header = _Header(top, None, len(above) + 1, line)
+        return header or self._without_names(data, width)
 
     def _is_as_below(self, top: Sequence[str], numeric: frozenset[int]) -> bool:
         """Return whether a cell of the first row is no name: a text that its column has below, or a time."""
         texts = {(k, cell) for _, row in self.rows[1:] if row != top for k, cell in enumerate(row)}
         cells = [(k, cell) for k, cell in enumerate(top) if k not in numeric and cell]
         return any(item in texts or seconds_since_first([item[1]]) is not None for item in cells)
-
-    def _without_kinds(self, data: int | None, numeric: frozenset[int]) -> int | None:
-        """Return the first row of numbers, after leaving out those that say of which kinds the columns are."""
-        for k in range(1, data or 0):
-            kinds = {cell.lower() for c, cell in enumerate(self.rows[k][1]) if c in numeric} - {""}
-            named = any(len(kind) > 1 for kind in kinds) or ("c" in kinds and self.rows[k + 1 : data])
-            if named and all(map(_KIND.fullmatch, kinds)):
-                told = [row for _, row in self.rows[k:data]]
-                self._tell(
-                    (number for number, row in self.rows if row in told), "line on the kinds of columns"
-                )
-                self.rows = [line for line in self.rows if line[1] not in told]
-                return k
-        return data
 
     def _second_names(self, data: int, width: int, numeric: frozenset[int]) -> int | None:
         """Return the last row of names behind a few rows of numbers, as those of a summary; None if there is none."""
@@ -339,40 +331,40 @@ class _Layout:
         ]
         return named[-1] if named else None
 
-    def _header_before(self, data: int, width: int, numeric: frozenset[int]) -> _Header:
-        """Return where the names are if `data` rows come before the numbers. Raises DataDamaged if none has names."""
-        if better := self._better_names(width, data) or self._joined_names(data, width):
-            return better
+    def _names_in_row(self, data: int, width: int, numeric: frozenset[int]) -> _Header | None:
+        """Return the names in one of the rows before the numbers, None if none has names. Raises DataDamaged.
+
+        Units, or the kinds of the columns, come behind the names, and remarks on the columns may come behind these.
+        """
         head = [row for _, row in self.rows[:data]]
         below = [row for _, row in self.rows[data:] if row not in head]
         texts = [set() if k in numeric else {row[k] for row in below if k < len(row)} for k in range(width)]
-        able = [k for k in range(data) if _can_be_names(self.rows[k][1], width, texts)]
-        if not able:
-            return self._names_in_comment(width, data) or self._without_names(data, width)
-        # Units come behind the names, and remarks on the columns may come behind the units.
-        with_units = [
+        able = [k for k in range(data) if _can_be_names(head[k], width, texts)]
+        above_units = [
             k
             for k in able
             if k + 1 < data
-            and len(self.rows[k][1]) <= len(self.rows[k + 1][1])
-            and _are_units(self.rows[k + 1][1])
-            and not _are_units(self.rows[k][1])
-            and not any(is_number(cell) for _, row in self.rows[k + 2 : data] for cell in row)
+            and len(head[k]) <= len(head[k + 1])
+            and (_are_units(head[k + 1]) or _are_kinds(head[k + 1], followed=k + 2 < data))
+            and not _are_units(head[k])
+            and not any(map(is_number, chain(*head[k + 2 :])))
         ]
-        names = (with_units or able)[-1]
-        above = self.rows[names - 1][1] if names and not with_units else []
-        units = (
-            self.rows[names + 1][1]
-            if with_units
-            else above
-            if len(above) == width and _are_units(above)
-            else None
-        )
-        if skipped := [number for number, row in self.rows[:names] if row is not units]:
+        if not able:
+            return None
+        names = (above_units or able)[-1]
+        line, row = self.rows[names]
+        beside = head[names + 1] if above_units else None
+        if names and not above_units and len(head[names - 1]) == width and _are_units(head[names - 1]):
+            beside = head[names - 1]
+        kinds = beside is not None and _are_kinds(beside, followed=names + 2 < data)
+        plain = {number for number, _ in self.rows[:names]} - {number for number, _ in self.comments}
+        if skipped := [number for number, row in self.rows[:names] if number in plain and row is not beside]:
             self._refuse_numbers_before(names)
-            self.notes.append(f"the names of the columns are those of line {self.rows[names][0]}")
+            self.notes.append(f"the names of the columns are those of line {line}")
             self._tell(skipped, "line before them")
-        return _Header(self.rows[names][1], units, data if with_units else names + 1, self.rows[names][0])
+        if kinds:
+            self._tell((number for number, row in self.rows if row == beside), "line on the kinds of columns")
+        return _Header(row, None if kinds else beside, data if above_units else names + 1, line, beside)
 
     def _without_names(self, data: int, width: int) -> _Header:
         """Return names for numbers without any. Raises DataDamaged if lines before them may have names."""
@@ -405,6 +397,7 @@ class _Layout:
         has_first = any(row[0] for row in levels)
         named = any(_names_all(row) and (row[0] or not has_first) for row in levels)
         named &= len(levels) < 3 or any(levels[-1][1:])  # else pandas names the index below its levels
+        named |= any(_are_kinds(row, followed=True) for row in levels)
         if len(levels) < 2 or named or any(map(is_number, chain(*levels))):
             return None
         *upper, lowest = levels
@@ -433,30 +426,18 @@ class _Layout:
                 'or say in a manifest which line begins each grasp: start = "a text in that line"'
             )
 
-    def _better_names(self, width: int, data: int) -> _Header | None:
-        """Return the names in a comment, None if the row before the numbers has a name for each column, or for R's."""
-        row = self.rows[data - 1][1] if data else []
-        named = len(row) == width and not any(map(is_number, row))
-        if data == 0 or named or _begin_with_names(self.rows[data:], width, self.numbered):
-            return None
-        return self._names_in_comment(width, data)
-
-    def _names_in_comment(self, width: int, data: int) -> _Header | None:
-        """Return the names and the units that comments before this row have; None if none has names.
-
-        Units stand in the last comment.
-        """
-        begin = self.rows[data][0]
+    def _names_in_comments(self, width: int, begin: int) -> list[Row]:
+        """Return the comments before this line that have a name, or a unit, for each column."""
         above = [(number, self._cells(line, width)) for number, line in self.comments if number < begin]
-        units = None
-        if len(above) > 1 and len(above[-1][1]) == width and _are_units(above[-1][1]):
-            units = above.pop()[1]
-        # As many words as columns can be a remark.
-        for number, cells in above[-1:] if self.separator == " " else reversed(above):
-            if len(cells) == width and _names_all(cells) and not any(map(is_number, cells)):
-                self._tell([line for line, _ in self.rows[:data]], "line before the numbers")
-                return _Header(cells, units, data, number)
-        return None
+        if self.separator == " ":  # as many words as columns can be a remark
+            above = above[-2:] if above and _are_units(above[-1][1]) else above[-1:]
+        return [
+            (number, cells)
+            for number, cells in above
+            if len(cells) == width
+            and (_names_all(cells) or _are_units(cells))
+            and not any(map(is_number, cells))
+        ]
 
     def _cells(self, comment: str, width: int) -> list[str]:
         """Return the names in a text, which may separate so many words by another sign than the rows do."""
@@ -476,29 +457,36 @@ class _Layout:
         self.notes += [f"left out: {counted(len(lines), what, several)} (line {some})"] if lines else []
 
     def _without_repeats(
-        self, rows: list[Row], names: Sequence[str], units: Sequence[str] | None
+        self, rows: list[Row], names: Sequence[str], beside: Sequence[str] | None
     ) -> list[Row]:
-        """Return the rows that are not the header again."""
+        """Return the rows that are not the header again, nor the row beside it."""
         folded = [name.casefold() for name in names]
         again = {number for number, row in rows if [cell.casefold() for cell in row] == folded}
         if not again or all(map(is_number, names)):
             return rows
         self._tell(again, "repeated header")
-        return [row for row in rows if row[0] not in again and row[1] != units]
+        return [row for row in rows if row[0] not in again and row[1] != beside]
 
     def _without_texts(self, rows: list[Row], width: int) -> list[Row]:
-        """Return the rows without lines of text, as a device prints one between its numbers, or several behind them."""
+        """Return the rows without lines of text, as a device prints one between its numbers, or several behind them.
+
+        Behind are words in place of a time, or of a number in the last lines that stand apart, and several words where
+        numbers are expected, and no number there.
+        """
         sample = _sample([row for _, row in rows])
         numeric = _numeric_columns(sample, width)
-        rises = 0 in numeric and _rise([row[0] for row in sample if is_number(row[0])])
+        rises = _rise([row[0] for row in sample if is_number(row[0])])
         apart = max((line for (above, _), (line, _) in pairwise(rows) if line > above + 1), default=math.inf)
-        apart = apart if 0 in numeric else math.inf
-        behind = takewhile(
-            lambda row: _is_text_behind(row[1], width, numeric, rises=rises or row[0] >= apart),
-            reversed(rows),
-        )
+
+        def is_text(line: Row) -> bool:
+            number, row = line
+            there = [row[k] for k in numeric if k < len(row) and not is_missing(row[k])]
+            words = 0 in numeric and (rises or number >= apart)
+            words = words and not (is_missing(row[0]) or re.search(r"\d", row[0]))
+            return words or (len(row) == width and len(there) > 1 and not any(map(is_number, there)))
+
         texts = {number for number, row in rows if len(row) < width and not any(map(is_number, row))}
-        texts |= {number for number, _ in behind}
+        texts |= {number for number, _ in takewhile(is_text, reversed(rows))}
         if not 0 < len(texts) <= max(_FEW_BEFORE, _MOST_BEFORE * len(rows)):
             return rows
         self._tell(texts, "line of text")
@@ -665,11 +653,6 @@ def _separator(lines: Sequence[str], quote: str) -> str:
     return max(agreeing, key=lambda separator: agreeing[separator], default="\x1f")
 
 
-def _last(line: str, separator: str) -> str:
-    """Return the last cell of a line that has no quotes."""
-    return line.rstrip(separator).rpartition(separator.strip(" ") or " ")[2].strip(" \"'")
-
-
 def _split(line: str, separator: str, quote: str = '"') -> list[str]:
     """Return the cells of a line; none if it cannot be divided. Spaces within quotes are of their word."""
     if separator == "  ":
@@ -718,13 +701,6 @@ def _rise(cells: Sequence[str]) -> bool:
     return len(cells) > _FEW_BEFORE and rise
 
 
-def _is_text_behind(row: Sequence[str], width: int, numeric: frozenset[int], *, rises: bool) -> bool:
-    """Return whether a row has words in place of a time, or several where numbers are expected, and no number there."""
-    there = [row[k] for k in numeric if k < len(row) and not is_missing(row[k])]
-    words = rises and not (is_missing(row[0]) or re.search(r"\d", row[0]))
-    return words or (len(row) == width and len(there) > 1 and not any(map(is_number, there)))
-
-
 def _can_be_names(row: Sequence[str], width: int, texts: Sequence[set[str]]) -> bool:
     """Return whether a row can name so many columns: different texts, and none that a column of text has below."""
     named = [cell for cell in row if cell]
@@ -749,6 +725,13 @@ def _are_units(row: Sequence[str]) -> bool:
         cell for cell in named if cell.strip("[]()").lower() in UNITS or cell[0] + cell[-1] in ("[]", "()")
     ]
     return bool(named) and 2 * len(units) > len(named)
+
+
+def _are_kinds(row: Sequence[str], *, followed: bool) -> bool:
+    """Return whether a row says of which kinds the columns are; letters alone are units, if numbers follow."""
+    kinds = {cell.lower() for cell in row} - {""}
+    named = any(len(kind) > 1 for kind in kinds) or ("c" in kinds and followed)
+    return named and all(map(_KIND.fullmatch, kinds))
 
 
 def _decimals(cell: str) -> int:
