@@ -254,12 +254,7 @@ def _mixed(cells: Sequence[str]) -> NotNumbers:
     fits = [_EVERY if is_missing(cell) else _notations(cell) for cell in cells]
     usual = max(_NOTATIONS, key=lambda notation: sum(1 for fit in fits if fit & notation))
     row = next(k for k, fit in enumerate(fits) if not fit & usual)
-    advice = {
-        POINT: "write a decimal point",
-        THOUSANDS: "the other cells have a decimal point and commas between thousands",
-        COMMA: "the other cells have a decimal comma",
-    }[usual]
-    return NotNumbers(row, cells[row], f"which is not a number ({advice})")
+    return NotNumbers(row, cells[row], "which has other marks than most cells: write a decimal point alone")
 
 
 def _read(cells: Sequence[str], common: int, of_file: int, *, decimal_commas: bool) -> Numbers | NotNumbers:

@@ -166,24 +166,24 @@ class _Layout:
     """How the lines of a file are laid out."""
 
     def __init__(self, path: Path, lines: Sequence[Line], ended: bool) -> None:
-        self.path = path
+        self.path, self.ended = path, ended
         self.notes: list[str] = []
         written = [(number, line) for number, line in lines if line.strip()]
         given = _SEPARATOR_LINE.fullmatch(written[0][1]) if written else None
         if given:
             written = written[1:]
-        self.shown_as_it_is = any('="' in line for _, line in written)
         self.comments, plain = _comments_and_others(written)
         for whole in _WHOLE_LINES:
             if all(whole.fullmatch(line) for _, line in plain):
                 plain = [(number, line.strip()[1:-1].replace('""', '"')) for number, line in plain]
         self.quote = "'" if any(_APOSTROPHES.fullmatch(line) for _, line in plain[:_FEW_BEFORE]) else '"'
         self.separator = given[1] if given else _separator([line for _, line in _sample(plain)], self.quote)
+        if not ended and plain and sum(line.count(self.quote) for _, line in plain) % 2:
+            self._tell_cut(plain.pop()[0])
         plain = self._without_remarks(plain)
         self.numbered = {number for number, line in plain if _QUOTED_NUMBER.match(line)}
-        self.ended = ended
         self.blank: list[int] = []
-        self.rows = _with_remarks(self._checked(self._rows(plain)))
+        self.rows = _with_remarks(self._rows(plain))
 
     def table(self) -> TextTable:
         """Return the table. Raises DataDamaged."""
@@ -235,50 +235,29 @@ class _Layout:
         self._tell(shorter, "line with a comment behind its cells")
         return [(number, shorter.get(number, line)) for number, line in lines]
 
-    def _rows(self, lines: Sequence[Line]) -> Iterator[Row]:
-        """Yield the cells of each line; a cell in quotes may go over several lines. Raises DataDamaged."""
-        if self.separator in _SPACES:
-            for number, line in lines:
-                yield number, _split(line, self.separator)
-            return
-        reader = csv.reader(
-            (line + "\n" for _, line in lines),
-            delimiter=self.separator,
-            quotechar=self.quote,
-            skipinitialspace=True,
-            strict=True,
-        )
-        whole = 0
-        try:
-            for row in reader:
-                cells = list(map(str.strip, row))
-                if self.shown_as_it_is:
-                    cells = [_SHOWN_AS_IT_IS.sub(r"\1", cell) for cell in cells]
-                whole = reader.line_num
-                yield lines[whole - 1][0], cells
-        except (csv.Error, ValueError) as error:
-            number = lines[max(0, min(reader.line_num, len(lines)) - 1)][0]
-            if not self.ended and 0 < whole == len(lines) - 1:
-                self.notes.append(f"line {number} is cut off, and left out")
-                self.ended = True
-                return
-            raise DataDamaged(f"{self.path}, line {number}: {error}") from None
+    def _rows(self, lines: Sequence[Line]) -> list[Row]:
+        """Return the cells of each line that is not empty, without the last columns that none has.
 
-    def _checked(self, rows: Iterator[Row]) -> list[Row]:
-        """Return the rows that are not empty, without the last columns that none has, and keep the others' numbers.
-
-        Separators at the end of lines make such columns. Raises DataDamaged for too many cells.
+        A cell in quotes may go over several lines; a row has the number of its last one. Separators at the end of lines
+        make empty columns. Raises DataDamaged, also for too many cells.
         """
-        kept, cells, most, widest = [], 0, CELLS.most, COLUMNS.most
-        for number, row in rows:
-            if not any(row):
-                self.blank.append(number)
-                continue
-            cells += len(row)
-            if len(row) > widest or cells > most:
-                too_many = COLUMNS.exceeded(len(row)) or CELLS.exceeded(cells)
-                raise DataDamaged(f"{self.path}, line {number}: {too_many}")
-            kept.append((number, row))
+        kept, count, line = [], 0, 0
+        reader = _reader([text + "\n" for _, text in lines], self.separator, self.quote)
+        rows = reader if reader else (_split(text, self.separator) for _, text in lines)
+        try:
+            for k, row in enumerate(rows, 1):
+                line = lines[(reader.line_num if reader else k) - 1][0]
+                if not any(map(str.strip, row)):
+                    self.blank.append(line)
+                    continue
+                cells = [_SHOWN_AS_IT_IS.sub(r"\1", cell.strip()) for cell in row]
+                count += len(cells)
+                if too_many := COLUMNS.exceeded(len(cells)) or CELLS.exceeded(count):
+                    raise DataDamaged(f"{self.path}, line {line}: {too_many}")
+                kept.append((line, cells))
+        except (csv.Error, ValueError) as error:
+            line = lines[max(0, min(reader.line_num, len(lines)) - 1)][0]
+            raise DataDamaged(f"{self.path}, line {line}: {error}") from None
         used = longest = max((len(row) for _, row in kept), default=0)
         while used and not any(any(row[used - 1 :]) for _, row in kept):
             used -= 1
@@ -300,14 +279,15 @@ class _Layout:
         if names := self._second_names(data, width, numeric):
             data = names + 1
         above = self._names_in_comments(width, self.rows[data][0])
-        self.rows = sorted([*self.rows, *above])
-        header = self._joined_names(data + len(above), width) or self._names_in_row(
-            data + len(above), width, numeric
-        )
+        plain, self.rows = self.rows, sorted([*self.rows, *above])
+        begin = data + len(above)
+        if header := self._joined_names(begin, width) or self._names_in_row(begin, width, numeric):
+            return header
+        self.rows = plain
         likely = len(top) > max(1, width - 2) if data else not self._is_as_below(top, numeric)
-        if header is None and data < 2 and likely and not _are_numbers(top):
-            header = _Header(top, None, len(above) + 1, line)
-        return header or self._without_names(data, width)
+        if data < 2 and likely and not _are_numbers(top):
+            return _Header(top, None, 1, line)
+        return self._without_names(data, width)
 
     def _is_as_below(self, top: Sequence[str], numeric: frozenset[int]) -> bool:
         """Return whether a cell of the first row is no name: a text that its column has below, or a time."""
@@ -359,7 +339,13 @@ class _Layout:
         kinds = beside is not None and _are_kinds(beside, followed=names + 2 < data)
         plain = {number for number, _ in self.rows[:names]} - {number for number, _ in self.comments}
         if skipped := [number for number, row in self.rows[:names] if number in plain and row is not beside]:
-            self._refuse_numbers_before(names)
+            numbers = [number for number, row in self.rows[:names] if len(row) > 1 and _are_numbers(row)]
+            if len(numbers) > max(_FEW_BEFORE, _MOST_BEFORE * (len(self.rows) - names)):
+                raise DataDamaged(
+                    f"{self.path}: line {line} names the columns of the lines after it, and {len(numbers)} lines of "
+                    f"numbers come before it, from line {numbers[0]} on: are these two tables? Divide the file, or say "
+                    'in a manifest which line begins each grasp: start = "a text in that line"'
+                )
             self.notes.append(f"the names of the columns are those of line {line}")
             self._tell(skipped, "line before them")
         if kinds:
@@ -416,16 +402,6 @@ class _Layout:
         )
         return _Header(names, units, data, lines[-1])
 
-    def _refuse_numbers_before(self, names: int) -> None:
-        """Raise DataDamaged if rows of numbers that may be a part of the data come before the row `names`."""
-        numbers = [number for number, row in self.rows[:names] if len(row) > 1 and _are_numbers(row)]
-        if len(numbers) > max(_FEW_BEFORE, _MOST_BEFORE * (len(self.rows) - names)):
-            raise DataDamaged(
-                f"{self.path}: line {self.rows[names][0]} names the columns of the lines after it, and {len(numbers)} "
-                f"lines of numbers come before it, from line {numbers[0]} on: are these two tables? Divide the file, "
-                'or say in a manifest which line begins each grasp: start = "a text in that line"'
-            )
-
     def _names_in_comments(self, width: int, begin: int) -> list[Row]:
         """Return the comments before this line that have a name, or a unit, for each column."""
         above = [(number, self._cells(line, width)) for number, line in self.comments if number < begin]
@@ -456,6 +432,11 @@ class _Layout:
         several = what.replace("line ", "lines ", 1) if what.startswith("line ") else f"{what}s"
         self.notes += [f"left out: {counted(len(lines), what, several)} (line {some})"] if lines else []
 
+    def _tell_cut(self, number: int) -> None:
+        """Note that the last line is not whole."""
+        self.notes.append(f"line {number} is cut off, and left out")
+        self.ended = True
+
     def _without_repeats(
         self, rows: list[Row], names: Sequence[str], beside: Sequence[str] | None
     ) -> list[Row]:
@@ -475,7 +456,11 @@ class _Layout:
         """
         sample = _sample([row for _, row in rows])
         numeric = _numeric_columns(sample, width)
-        rises = _rise([row[0] for row in sample if is_number(row[0])])
+        times = columns_of_numbers({"": [row[0] for row in sample if is_number(row[0])]})[""]
+        # As times and the numbers of rows do; labels and features do not.
+        rises = (
+            not isinstance(times, NotNumbers) and len(times) > _FEW_BEFORE and all(map(lt, times, times[1:]))
+        )
         apart = max((line for (above, _), (line, _) in pairwise(rows) if line > above + 1), default=math.inf)
 
         def is_text(line: Row) -> bool:
@@ -503,7 +488,7 @@ class _Layout:
         # An empty last cell may be a missing value, as in other rows.
         if len(last) == width and (last[-1] or not all(ends)) and not shorter:
             return rows
-        self.notes.append(f"line {number} is cut off, and left out")
+        self._tell_cut(number)
         return rows[:-1]
 
 
@@ -653,6 +638,13 @@ def _separator(lines: Sequence[str], quote: str) -> str:
     return max(agreeing, key=lambda separator: agreeing[separator], default="\x1f")
 
 
+def _reader(lines: Iterable[str], separator: str, quote: str) -> Any:
+    """Return the reader of lines that a sign separates, None for spaces."""
+    if separator in _SPACES:
+        return None
+    return csv.reader(lines, delimiter=separator, quotechar=quote, skipinitialspace=True, strict=True)
+
+
 def _split(line: str, separator: str, quote: str = '"') -> list[str]:
     """Return the cells of a line; none if it cannot be divided. Spaces within quotes are of their word."""
     if separator == "  ":
@@ -660,8 +652,7 @@ def _split(line: str, separator: str, quote: str = '"') -> list[str]:
     if separator == " ":
         return [quoted or word for quoted, word in re.findall(r'"([^"]*)"(?!\S)|(\S+)', line)]
     try:
-        rows = csv.reader([line], delimiter=separator, quotechar=quote, skipinitialspace=True, strict=True)
-        return [*map(str.strip, next(rows, []))]
+        return [*map(str.strip, next(_reader([line], separator, quote), []))]
     except (csv.Error, ValueError):
         return []
 
@@ -692,13 +683,6 @@ def _is_data(row: Sequence[str], width: int, numeric: frozenset[int]) -> bool:
     """Return whether a row has a number where numbers are expected, and nothing else there."""
     there = [row[k] for k in numeric if k < len(row) and not is_missing(row[k])]
     return len(row) == width and bool(there) and all(map(is_number, there))
-
-
-def _rise(cells: Sequence[str]) -> bool:
-    """Return whether numbers rise from row to row, as times and the numbers of rows do, and labels and features not."""
-    numbers = columns_of_numbers({"": cells})[""]
-    rise = not isinstance(numbers, NotNumbers) and all(map(lt, numbers, numbers[1:]))
-    return len(cells) > _FEW_BEFORE and rise
 
 
 def _can_be_names(row: Sequence[str], width: int, texts: Sequence[set[str]]) -> bool:
