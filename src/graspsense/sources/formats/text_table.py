@@ -241,18 +241,22 @@ class _Layout:
         A cell in quotes may go over several lines; a row has the number of its last one. Separators at the end of lines
         make empty columns. Raises DataDamaged, also for too many cells.
         """
-        kept, count, line = [], 0, 0
+        kept, count, line, most, widest = [], 0, 0, CELLS.most, COLUMNS.most
+        shown_as_it_is = any('="' in text for _, text in lines)
         reader = _reader([text + "\n" for _, text in lines], self.separator, self.quote)
         rows = reader if reader else (_split(text, self.separator) for _, text in lines)
         try:
             for k, row in enumerate(rows, 1):
                 line = lines[(reader.line_num if reader else k) - 1][0]
-                if not any(map(str.strip, row)):
+                cells = [*map(str.strip, row)]
+                if not any(cells):
                     self.blank.append(line)
                     continue
-                cells = [_SHOWN_AS_IT_IS.sub(r"\1", cell.strip()) for cell in row]
+                if shown_as_it_is:
+                    cells = [_SHOWN_AS_IT_IS.sub(r"\1", cell) for cell in cells]
                 count += len(cells)
-                if too_many := COLUMNS.exceeded(len(cells)) or CELLS.exceeded(count):
+                if len(cells) > widest or count > most:
+                    too_many = COLUMNS.exceeded(len(cells)) or CELLS.exceeded(count)
                     raise DataDamaged(f"{self.path}, line {line}: {too_many}")
                 kept.append((line, cells))
         except (csv.Error, ValueError) as error:
