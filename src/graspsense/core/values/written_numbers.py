@@ -246,15 +246,12 @@ def _common(cells: Sequence[str]) -> int | NotNumbers:
     if given and all(cells[row].startswith("(") for row in given):
         why = "and all cells have parentheses or a minus sign last: write the minus sign first"
         return NotNumbers(given[0], cells[given[0]], why)
-    return common or _mixed(cells)
-
-
-def _mixed(cells: Sequence[str]) -> NotNumbers:
-    """Return which cell is written in another way than most."""
-    fits = [_EVERY if is_missing(cell) else _notations(cell) for cell in cells]
-    usual = max(_NOTATIONS, key=lambda notation: sum(1 for fit in fits if fit & notation))
-    row = next(k for k, fit in enumerate(fits) if not fit & usual)
-    return NotNumbers(row, cells[row], "which has other marks than most cells: write a decimal point alone")
+    if common:
+        return common
+    each = [_EVERY if is_missing(cell) else _notations(cell) for cell in cells]
+    usual = max(_NOTATIONS, key=lambda notation: sum(1 for fit in each if fit & notation))
+    row = next(k for k, fit in enumerate(each) if not fit & usual)
+    return NotNumbers(row, cells[row], "which has other marks than most: write a decimal point alone")
 
 
 def _read(cells: Sequence[str], common: int, of_file: int, *, decimal_commas: bool) -> Numbers | NotNumbers:

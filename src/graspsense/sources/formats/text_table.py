@@ -14,7 +14,6 @@ import re
 import unicodedata
 from collections import Counter
 from collections.abc import Container, Iterable, Iterator, Sequence
-from functools import partial
 from itertools import chain, compress, pairwise, takewhile
 from operator import itemgetter, lt
 from pathlib import Path
@@ -70,6 +69,7 @@ _WHOLE_LINES: Final = (re.compile(r"\s*\|.*\|\s*"), re.compile(r'\s*"(?:[^"]|"")
 """Lines in bars, as of Markdown, and in quotes, as a spreadsheet saves what it has not divided."""
 _APOSTROPHES: Final = re.compile(r"[;,\t|]? *'[^']*' *(?:[;,\t|] *'[^']*' *)+[;,\t|]?")
 """Names in apostrophes in place of quotes."""
+_APOSTROPHE: Final = re.compile(r"(?<![^;,\t|])'|'(?![^;,\t|])")
 _QUOTED_NUMBER: Final = re.compile(r'"\d+"[;,\t| ](?:.*[;,\t| ])?[-+.\d]')
 """A number in quotes, as R writes the name of a row, before one without them."""
 _REMARK: Final = re.compile(r"\s(?:#|%|//|!)\s*[^\s\d]")
@@ -108,10 +108,10 @@ Row = tuple[int, list[str]]
 class TextTable:
     """The cells of a table as text. A column without a name has an empty one; `units` are those of a line of units."""
 
-    names: tuple[str, ...]
-    units: tuple[str, ...]
-    columns: tuple[Sequence[str], ...]
-    lines: tuple[int, ...]
+    names: tuple[str, ...] = ()
+    units: tuple[str, ...] = ()
+    columns: tuple[Sequence[str], ...] = ()
+    lines: tuple[int, ...] = ()
     """The line of each row."""
     notes: tuple[str, ...] = ()
     named_in: int = 0
@@ -176,9 +176,10 @@ class _Layout:
         for whole in _WHOLE_LINES:
             if all(whole.fullmatch(line) for _, line in plain):
                 plain = [(number, line.strip()[1:-1].replace('""', '"')) for number, line in plain]
-        self.quote = "'" if any(_APOSTROPHES.fullmatch(line) for _, line in plain[:_FEW_BEFORE]) else '"'
-        self.separator = given[1] if given else _separator([line for _, line in _sample(plain)], self.quote)
-        if not ended and plain and sum(line.count(self.quote) for _, line in plain) % 2:
+        if any(_APOSTROPHES.fullmatch(line) for _, line in plain[:_FEW_BEFORE]):
+            plain = [(number, _APOSTROPHE.sub('"', line)) for number, line in plain]
+        self.separator = given[1] if given else _separator([line for _, line in _sample(plain)])
+        if not ended and plain and sum(line.count('"') for _, line in plain) % 2:
             self._tell_cut(plain.pop()[0])
         plain = self._without_remarks(plain)
         self.numbered = {number for number, line in plain if _QUOTED_NUMBER.match(line)}
@@ -188,7 +189,7 @@ class _Layout:
     def table(self) -> TextTable:
         """Return the table. Raises DataDamaged."""
         if not self.rows:
-            return TextTable(names=(), units=(), columns=(), lines=())
+            return TextTable()
         names, units, begin, line, beside = self._header()
         check_columns(self.path, names)
         rows = self._without_repeats(self.rows[begin:], names, beside)
@@ -221,15 +222,15 @@ class _Layout:
         begins = {number: match.start() for number, line in lines if (match := _REMARK.search(line))}
         if not 0 < 2 * len(begins) < len(lines):
             return lines
-        split = partial(_split, separator=self.separator, quote=self.quote)
-        ends = {cells[-1] for number, line in lines if number not in begins and (cells := split(line))}
-        width, _ = _width([line for _, line in _sample(lines)], self.separator, self.quote)
+        others = (_split(line, self.separator) for number, line in lines if number not in begins)
+        ends = {cells[-1] for cells in others if cells}
+        width, _ = _width([line for _, line in _sample(lines)], self.separator)
         shorter: dict[int, str] = {}
         for number, line in lines:
             text = line[: begins.get(number)].rstrip(f"{self.separator} ")
-            cells = split(text) if number in begins else []
+            cells = _split(text, self.separator) if number in begins else []
             if len(cells) == width and (
-                len(split(line)) != width or is_number(cells[-1]) or cells[-1] in ends
+                len(_split(line, self.separator)) != width or is_number(cells[-1]) or cells[-1] in ends
             ):
                 shorter[number] = text
         self._tell(shorter, "line with a comment behind its cells")
@@ -243,7 +244,7 @@ class _Layout:
         """
         kept, count, line, most, widest = [], 0, 0, CELLS.most, COLUMNS.most
         shown_as_it_is = any('="' in text for _, text in lines)
-        reader = _reader([text + "\n" for _, text in lines], self.separator, self.quote)
+        reader = _reader([text + "\n" for _, text in lines], self.separator)
         rows = reader if reader else (_split(text, self.separator) for _, text in lines)
         try:
             for k, row in enumerate(rows, 1):
@@ -535,10 +536,9 @@ def _begin_with_names(rows: Sequence[Row], width: int, in_quotes: Container[int]
         return False
     if not any(map(is_number, names)):
         return n > _FEW_BEFORE
-    if all(number in in_quotes for number, _ in rows):
-        return True
     counted = {*names} in ({*map(str, range(n))}, {*map(str, range(1, n + 1))})
-    return counted and names != sorted(names, key=int, reverse=True)
+    measured = not counted or names == sorted(names, key=int, reverse=True)
+    return not measured or all(number in in_quotes for number, _ in rows)
 
 
 def numbers_with_unit(cells: Sequence[str], of_column: str = "") -> tuple[Sequence[str], str]:
@@ -624,13 +624,13 @@ def _sample(lines: Sequence[Any]) -> list[Any]:
     return [*lines[:half], *lines[half :: max(1, (len(lines) - half) // half)]]
 
 
-def _separator(lines: Sequence[str], quote: str) -> str:
+def _separator(lines: Sequence[str]) -> str:
     """Return what separates the cells of these lines: a semicolon, a tab, a comma, a bar, or any number of spaces.
 
     It gives most lines, and so their names, the same number of cells. In a single column it is a sign that no text has:
     the name may have spaces.
     """
-    widths = {separator: _width(lines, separator, quote) for separator in _SEPARATORS}
+    widths = {separator: _width(lines, separator) for separator in _SEPARATORS}
     agreeing = {separator: count for separator, (width, count) in widths.items() if width > 1}
     signs = {separator: count for separator, count in agreeing.items() if separator.strip(" ")}
     between = (2 * sum(map(is_number, words)) > len(words) for words in (_split(line, " ") for line in lines))
@@ -642,21 +642,21 @@ def _separator(lines: Sequence[str], quote: str) -> str:
     return max(agreeing, key=lambda separator: agreeing[separator], default="\x1f")
 
 
-def _reader(lines: Iterable[str], separator: str, quote: str) -> Any:
+def _reader(lines: Iterable[str], separator: str) -> Any:
     """Return the reader of lines that a sign separates, None for spaces."""
     if separator in _SPACES:
         return None
-    return csv.reader(lines, delimiter=separator, quotechar=quote, skipinitialspace=True, strict=True)
+    return csv.reader(lines, delimiter=separator, skipinitialspace=True, strict=True)
 
 
-def _split(line: str, separator: str, quote: str = '"') -> list[str]:
+def _split(line: str, separator: str) -> list[str]:
     """Return the cells of a line; none if it cannot be divided. Spaces within quotes are of their word."""
     if separator == "  ":
         return [word.strip('"') for word in re.split(r"\s{2,}", line.strip())]
     if separator == " ":
         return [quoted or word for quoted, word in re.findall(r'"([^"]*)"(?!\S)|(\S+)', line)]
     try:
-        return [*map(str.strip, next(_reader([line], separator, quote), []))]
+        return [*map(str.strip, next(_reader([line], separator), []))]
     except (csv.Error, ValueError):
         return []
 
@@ -666,11 +666,11 @@ def _are_numbers(cells: Sequence[str]) -> bool:
     return all(is_number(cell) or is_missing(cell) for cell in cells)
 
 
-def _width(lines: Sequence[str], separator: str, quote: str) -> tuple[int, int]:
+def _width(lines: Sequence[str], separator: str) -> tuple[int, int]:
     """Return the most frequent number of cells of a line, without separators at its end, and how many lines have it."""
     short = [line.rstrip(separator) for line in lines]
     widths = Counter(
-        len(_split(text if separator in text else line, separator, quote))
+        len(_split(text if separator in text else line, separator))
         for text, line in zip(short, lines, strict=True)
     )
     return max(widths.items(), key=itemgetter(1), default=(1, 0))
