@@ -242,16 +242,15 @@ def _common(cells: Sequence[str]) -> int | NotNumbers:
         if not fits:
             return NotNumbers(row, cell, "which is not a number; a missing one is an empty cell")
         common &= fits
+        if not common:
+            return NotNumbers(
+                row, cell, "which has other marks than the cells above: write a decimal point alone"
+            )
     given = [row for row, cell in enumerate(cells) if not is_missing(cell)]
     if given and all(cells[row].startswith("(") for row in given):
         why = "and all cells have parentheses or a minus sign last: write the minus sign first"
         return NotNumbers(given[0], cells[given[0]], why)
-    if common:
-        return common
-    each = [_EVERY if is_missing(cell) else _notations(cell) for cell in cells]
-    usual = max(_NOTATIONS, key=lambda notation: sum(1 for fit in each if fit & notation))
-    row = next(k for k, fit in enumerate(each) if not fit & usual)
-    return NotNumbers(row, cells[row], "which has other marks than most: write a decimal point alone")
+    return common
 
 
 def _read(cells: Sequence[str], common: int, of_file: int, *, decimal_commas: bool) -> Numbers | NotNumbers:

@@ -412,13 +412,8 @@ class _Layout:
         above = [(number, self._cells(line, width)) for number, line in self.comments if number < begin]
         if self.separator == " ":  # as many words as columns can be a remark
             above = above[-2:] if above and _are_units(above[-1][1]) else above[-1:]
-        return [
-            (number, cells)
-            for number, cells in above
-            if len(cells) == width
-            and (_names_all(cells) or _are_units(cells))
-            and not any(map(is_number, cells))
-        ]
+        able = [len(cells) == width and (_names_all(cells) or _are_units(cells)) for _, cells in above]
+        return list(compress(above, able))
 
     def _cells(self, comment: str, width: int) -> list[str]:
         """Return the names in a text, which may separate so many words by another sign than the rows do."""
@@ -825,8 +820,7 @@ def _readings(data: bytes, place: int) -> str:
     readings: dict[str, str] = {}
     for code_page in _CODE_PAGES:
         reading = cell.decode(code_page, "replace")
-        letters = [letter for letter in reading if letter.isalpha()]
-        scripts = {unicodedata.name(letter, "").split()[0] for letter in letters}
-        if len(scripts) == 1 and all(sign.isascii() or sign in letters for sign in reading):
+        signs = (sign for sign in reading if sign.isalpha() or not sign.isascii())
+        if len({unicodedata.name(sign, "").partition(" ")[0] for sign in signs}) == 1:  # of one script
             readings.setdefault(reading, code_page)
     return listed([f"{reading} ({code_page})" for reading, code_page in readings.items()])
