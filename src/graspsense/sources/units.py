@@ -64,7 +64,7 @@ UNITS: Final = frozenset((
     "-", "1", "%", "a.u.", "au", "step", "steps", "v", "mv", "a", "ma", "ohm", "hz", "khz", "rpm", "c", "\u00b0c",
     "degc", "k", "deg", "\u00b0", "rad", "rad/s", "deg/s", "pa", "kpa", "mpa", "bar", "psi", "nm", "n\u00b7m", "n*m",
     "n*mm", "nmm", "j", "mj", "w", "mw", "ozf", "n/m", "n/mm", "n/cm", "n/s", "mm/n", "m/s2", "m/s^2", "m/s\u00b2",
-    "cm2", "mm2", "mm^2", "mm\u00b2", "ml", "cl", "dl",
+    "cm2", "mm2", "mm^2", "mm\u00b2", "ml", "cl", "dl", "ts", "rn",
 ))  # fmt: skip
 """What stands in a line of units, in small letters: units of the quantities above, and of others."""
 

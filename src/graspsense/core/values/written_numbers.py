@@ -41,11 +41,11 @@ _MISSING_WORDS: Final = frozenset({
     "nothing", "nil", "(null)", "no data", "n.d.", "k.a.", "undef"
 })  # fmt: skip
 _MISSING: Final = re.compile(
-    r"[-+]?(?:nan(?:\(\w*\)|0x[0-9a-f]+)?|1[.,]#(?:q?nan|ind)\d*)|#[^\W\d][^!?]*[!?]|#[\u00a1\u00bf].*|#n/?[adv]|err:\d{3}|\.[a-z]",
+    r"\*{4,}|[-+]?(?:nan(?:\(\w*\)|0x[0-9a-f]+)?|1[.,]#(?:q?nan|ind)\d*)|#[^\W\d][^!?]*[!?]|#[\u00a1\u00bf].*|#n/?[adv]|err:\d{3}|\.[a-z]",
     re.IGNORECASE,
 )
-"""NaN as the libraries of C write it, the errors of spreadsheets in their languages, such as `#WERT!`, and `.a` of
-Stata."""
+"""Stars, as Fortran writes a number that is too wide, NaN as the libraries of C write it, the errors of spreadsheets in
+their languages, such as `#WERT!`, and `.a` of Stata."""
 _LONGEST_MISSING: Final = 20
 
 _LOGICAL: Final = {"True": "1", "False": "0", "Wahr": "1", "Falsch": "0", "Vrai": "1", "Faux": "0"}
@@ -242,24 +242,15 @@ def _common(cells: Sequence[str]) -> int | NotNumbers:
         if not fits:
             return NotNumbers(row, cell, "which is not a number; a missing one is an empty cell")
         common &= fits
+        if not common:
+            return NotNumbers(
+                row, cell, "which has other marks than the cells above: write a decimal point alone"
+            )
     given = [row for row, cell in enumerate(cells) if not is_missing(cell)]
     if given and all(cells[row].startswith("(") for row in given):
         why = "and all cells have parentheses or a minus sign last: write the minus sign first"
         return NotNumbers(given[0], cells[given[0]], why)
-    return common or _mixed(cells)
-
-
-def _mixed(cells: Sequence[str]) -> NotNumbers:
-    """Return which cell is written in another way than most."""
-    fits = [_EVERY if is_missing(cell) else _notations(cell) for cell in cells]
-    usual = max(_NOTATIONS, key=lambda notation: sum(1 for fit in fits if fit & notation))
-    row = next(k for k, fit in enumerate(fits) if not fit & usual)
-    advice = {
-        POINT: "write a decimal point",
-        THOUSANDS: "the other cells have a decimal point and commas between thousands",
-        COMMA: "the other cells have a decimal comma",
-    }[usual]
-    return NotNumbers(row, cells[row], f"which is not a number ({advice})")
+    return common
 
 
 def _read(cells: Sequence[str], common: int, of_file: int, *, decimal_commas: bool) -> Numbers | NotNumbers:

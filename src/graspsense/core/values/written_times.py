@@ -21,8 +21,12 @@ _TIME: Final = re.compile(
     r"(?: ?(?P<half>[AP])\.?M\.?)? ?(?P<utc>Z|UTC|GMT|)(?P<zone>[-+][0-9]{2}:?[0-9]{2}|)",
     re.IGNORECASE,
 )
-_MONTHS: Final = ["jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec"]
-_MONTH: Final = re.compile(rf"(?<=\d)[- ](?:({')|('.join(_MONTHS)}))[a-z]*[- ]", re.IGNORECASE)
+_MONTHS: Final = [
+    "jan|ene|gen", "feb|f[e\u00e9]v", "m[a\u00e4]r|mrz|mrt", "a[pvb]r", "ma[yijg]|mei", "jun|juin|giu", "jul|juil|lug",
+    "aug|ao[u\u00fb]|ago", "se[pt]", "o[ck]t|ott|out", "nov", "d[e\u00e9][cz]|dic",
+]  # fmt: skip
+"""How the names of the months begin in English, German, French, Spanish, Italian, Dutch and Portuguese."""
+_MONTH: Final = re.compile(rf"(?<=\d)\.?[- ](?:({')|('.join(_MONTHS)}))[^\W\d]*\.?[- ]", re.IGNORECASE)
 _MINUTES: Final = re.compile(r"[0-5]?[0-9]:[0-5][0-9][.,][0-9]{1,9}")
 """Minutes and seconds; without a fraction they can be hours and minutes."""
 _DAY_S: Final = 86_400.0

@@ -141,12 +141,7 @@ class CsvColumns:
     def take_words_as_missing(self, names: Iterable[str]) -> None:
         """Take a word that repeats in one of these columns of numbers, and is its only one, as missing; note it."""
         for name in names:
-            if (
-                name in self.cells
-                and name not in self.levels
-                and self.numbers_or_none(name) is None
-                and self.has_numbers(name)
-            ):
+            if name in self.cells and not self.is_nominal(name) and self.numbers_or_none(name) is None:
                 cells = self._without_unit(name)
                 words = [cell for cell in cells if not (is_missing(cell) or is_number(cell))]
                 if len(words) > 1 == len(set(words)) and not re.search(r"\d", words[0]):

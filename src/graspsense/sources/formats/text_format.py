@@ -117,13 +117,12 @@ def _columns(path: Path, fields: dict[str, str], table: TextTable, *, several: b
     numbers: dict[str, Numbers] = {}
     texts: dict[str, Sequence[str]] = {}
     not_numbers: dict[str, str] = {}
-    seconds: dict[str, str] = {}
     units = {name: unit_in(name) or unit for name, unit in zip(cells, table.units, strict=True)}
     for name in cells:
         plain, units[name] = numbers_with_unit(cells[name], units[name])
         if plain is not cells[name]:
             texts[name], cells[name] = cells[name], plain
-    read = columns_of_numbers(cells)
+    read = columns_of_numbers(cells, decimal_commas=table.separator == ";")
     for name, column in read.items():
         if not isinstance(column, NotNumbers):
             numbers[name] = column
@@ -139,7 +138,7 @@ def _columns(path: Path, fields: dict[str, str], table: TextTable, *, several: b
         times, logical = seconds_since_first(cells[name]), truths(cells[name])
         if times is not None:
             numbers[name] = times
-            seconds[name] = "s"
+            units[name] = "s"
         elif logical is not None:
             numbers[name] = logical
         elif column.row or is_number(column.cell):
@@ -153,7 +152,7 @@ def _columns(path: Path, fields: dict[str, str], table: TextTable, *, several: b
         numbers=numbers,
         texts=texts,
         fields=fields,
-        units={name: unit for name, unit in units.items() if unit} | seconds,
+        units={name: unit for name, unit in units.items() if unit},
         lines=np.array(table.lines, dtype=np.int64),
         not_numbers=not_numbers,
         notes=table.notes,

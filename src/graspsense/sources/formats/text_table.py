@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 import re
 import unicodedata
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Sequence
 from itertools import chain, compress, pairwise, takewhile
 from operator import itemgetter, lt
 from pathlib import Path
@@ -57,10 +58,20 @@ _RULE: Final = re.compile(r"(?=.*(?:[-_=]{3}|:-|-:))[-_=+|:\s]+")
 _REMARKS: Final = frozenset({"comment", "comments", "remark", "remarks", "note", "notes"})
 """Names of a last column that can be without any cell."""
 _KIND: Final = re.compile(
-    "<?(?:continuous|c|discrete|d|string|s|time|t|u?int(?:eger)?|float|double|real|num(?:ber|eric)?|dbl)(?:8|16|32|64)?>?"
+    "<?(?:continuous|c|discrete|d|string|str|s|(?:var)?char|text|object|time|t|u?int(?:eger)?|float|double|real"
+    "|num(?:ber|eric)?|dbl)(?:8|16|32|64)?>?"
 )
 """The kind of a column in a line below the names, as Orange and other programs write it, in small letters."""
 _SEPARATOR_LINE: Final = re.compile(r'"?sep=([;,\t|])"?\s*')
+_WHOLE_LINES: Final = (re.compile(r"\s*\|.*\|\s*"), re.compile(r'\s*"(?:[^"]|"")*"\s*'))
+"""Lines in bars, as of Markdown, and in quotes, as a spreadsheet saves what it has not divided."""
+_APOSTROPHES: Final = re.compile(r"[;,\t|]? *'[^']*' *(?:[;,\t|] *'[^']*' *)+[;,\t|]?")
+"""Names in apostrophes in place of quotes."""
+_APOSTROPHE: Final = re.compile(r"(?<![^;,\t|])'|'(?![^;,\t|])")
+_QUOTED_NUMBER: Final = re.compile(r'"\d+"[;,\t| ](?:.*[;,\t| ])?[-+.\d]')
+"""A number in quotes, as R writes the name of a row, before one without them."""
+_REMARK: Final = re.compile(r"\s(?:#|%|//|!)\s*[^\s\d]")
+"""The beginning of a comment behind cells."""
 _SPREADSHEETS: Final = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
 """The first bytes of a ZIP file, as which spreadsheets are saved, and of those of old programs."""
 _BINARY: Final = (*_SPREADSHEETS, b"PAR1", b"ARROW1")
@@ -95,10 +106,10 @@ Row = tuple[int, list[str]]
 class TextTable:
     """The cells of a table as text. A column without a name has an empty one; `units` are those of a line of units."""
 
-    names: tuple[str, ...]
-    units: tuple[str, ...]
-    columns: tuple[Sequence[str], ...]
-    lines: tuple[int, ...]
+    names: tuple[str, ...] = ()
+    units: tuple[str, ...] = ()
+    columns: tuple[Sequence[str], ...] = ()
+    lines: tuple[int, ...] = ()
     """The line of each row."""
     notes: tuple[str, ...] = ()
     named_in: int = 0
@@ -113,6 +124,8 @@ class _Header(NamedTuple):
     units: list[str] | None
     begin: int
     line: int
+    beside: list[str] | None = None
+    """The row beside the names that has units or the kinds of the columns."""
 
 
 def read_lines(path: Path, start: str = "") -> tuple[list[Line], bool]:
@@ -138,7 +151,7 @@ def table_of(path: Path, lines: Sequence[Line], *, ended: bool = True) -> TextTa
     """
     if text_suffix(path) in JSON_LINES:
         return _json_table(path, lines, ended)
-    return _Layout(path, lines).table(ended)
+    return _Layout(path, lines, ended).table()
 
 
 def text_suffix(path: Path) -> str:
@@ -150,33 +163,40 @@ def text_suffix(path: Path) -> str:
 class _Layout:
     """How the lines of a file are laid out."""
 
-    def __init__(self, path: Path, lines: Sequence[Line]) -> None:
-        self.path = path
+    def __init__(self, path: Path, lines: Sequence[Line], ended: bool) -> None:
+        self.path, self.ended = path, ended
         self.notes: list[str] = []
         written = [(number, line) for number, line in lines if line.strip()]
         given = _SEPARATOR_LINE.fullmatch(written[0][1]) if written else None
         if given:
             written = written[1:]
-        self.shown_as_it_is = any('="' in line for _, line in written)
         self.comments, plain = _comments_and_others(written)
-        if all(re.fullmatch(r"\s*\|.*\|\s*", line) for _, line in plain):
-            plain = [(number, line.strip()[1:-1]) for number, line in plain]
+        for whole in _WHOLE_LINES:
+            if all(whole.fullmatch(line) for _, line in plain):
+                plain = [(number, line.strip()[1:-1].replace('""', '"')) for number, line in plain]
+        if any(_APOSTROPHES.fullmatch(line) for _, line in plain[:_FEW_BEFORE]):
+            plain = [(number, _APOSTROPHE.sub('"', line)) for number, line in plain]
         self.separator = given[1] if given else _separator([line for _, line in _sample(plain)])
+        if not ended and plain and sum(line.count('"') for _, line in plain) % 2:
+            self._tell_cut(plain.pop()[0])
+        plain = self._without_remarks(plain)
+        self.numbered = {number for number, line in plain if _QUOTED_NUMBER.match(line)}
         self.blank: list[int] = []
-        self.rows = _with_remarks(self._checked(self._rows(plain)))
+        self.rows = _with_remarks(self._rows(plain))
 
-    def table(self, ended: bool) -> TextTable:
+    def table(self) -> TextTable:
         """Return the table. Raises DataDamaged."""
         if not self.rows:
-            return TextTable(names=(), units=(), columns=(), lines=())
-        names, units, begin, line = self._header()
+            return TextTable()
+        names, units, begin, line, beside = self._header()
         check_columns(self.path, names)
-        rows = self._without_repeats(self.rows[begin:], names, units)
+        rows = self._without_repeats(self.rows[begin:], names, beside)
         rows = self._without_texts(rows, len(names))
         rows = [(number, row if any(row[len(names) :]) else row[: len(names)]) for number, row in rows]
-        if names[0] and _begin_with_names(rows, len(names) + 1):
-            names, units = ["", *names], ["", *units] if units else None
-        rows = self._without_cut(rows, len(names), ended)
+        named = names[: -1 if line in self.separated else None]
+        if names[0] and _begin_with_names(rows if self.ended else rows[:-1], len(named) + 1, self.numbered):
+            names, units = ["", *named], ["", *units] if units else None
+        rows = self._without_cut(rows, len(names))
         for number, row in rows:
             if len(row) != len(names):
                 raise DataDamaged(
@@ -195,43 +215,56 @@ class _Layout:
             separator=self.separator,
         )
 
-    def _rows(self, lines: Sequence[Line]) -> Iterator[Row]:
-        """Yield the cells of each line; a cell in quotes may go over several lines. Raises DataDamaged."""
-        if self.separator in _SPACES:
-            for number, line in lines:
-                yield number, _split(line, self.separator)
-            return
-        reader = csv.reader(
-            (line + "\n" for _, line in lines), delimiter=self.separator, skipinitialspace=True, strict=True
-        )
-        try:
-            for row in reader:
-                cells = list(map(str.strip, row))
-                if self.shown_as_it_is:
-                    cells = [_SHOWN_AS_IT_IS.sub(r"\1", cell) for cell in cells]
-                yield lines[reader.line_num - 1][0], cells
-        except (csv.Error, ValueError) as error:
-            number = lines[max(0, min(reader.line_num, len(lines)) - 1)][0]
-            raise DataDamaged(f"{self.path}, line {number}: {error}") from None
+    def _without_remarks(self, lines: list[Line]) -> list[Line]:
+        """Return the lines without the comments that some have behind their cells."""
+        begins = {number: match.start() for number, line in lines if (match := _REMARK.search(line))}
+        if not 0 < 2 * len(begins) < len(lines):
+            return lines
+        others = (_split(line, self.separator) for number, line in lines if number not in begins)
+        ends = {cells[-1] for cells in others if cells}
+        width, _ = _width([line for _, line in _sample(lines)], self.separator)
+        shorter: dict[int, str] = {}
+        for number, line in lines:
+            text = line[: begins.get(number)].rstrip(f"{self.separator} ")
+            cells = _split(text, self.separator) if number in begins else []
+            if len(cells) == width and (
+                len(_split(line, self.separator)) != width or is_number(cells[-1]) or cells[-1] in ends
+            ):
+                shorter[number] = text
+        self._tell(shorter, "line with a comment behind its cells")
+        return [(number, shorter.get(number, line)) for number, line in lines]
 
-    def _checked(self, rows: Iterator[Row]) -> list[Row]:
-        """Return the rows that are not empty, without the last columns that none has, and keep the others' numbers.
+    def _rows(self, lines: Sequence[Line]) -> list[Row]:
+        """Return the cells of each line that is not empty, without the last columns that none has.
 
-        Separators at the end of lines make such columns. Raises DataDamaged for too many cells.
+        A cell in quotes may go over several lines; a row has the number of its last one. Separators at the end of lines
+        make empty columns. Raises DataDamaged, also for too many cells.
         """
-        kept, cells, most, widest = [], 0, CELLS.most, COLUMNS.most
-        for number, row in rows:
-            if not any(row):
-                self.blank.append(number)
-                continue
-            cells += len(row)
-            if len(row) > widest or cells > most:
-                too_many = COLUMNS.exceeded(len(row)) or CELLS.exceeded(cells)
-                raise DataDamaged(f"{self.path}, line {number}: {too_many}")
-            kept.append((number, row))
-        used = max((len(row) for _, row in kept), default=0)
+        kept, count, line, most, widest = [], 0, 0, CELLS.most, COLUMNS.most
+        shown_as_it_is = any('="' in text for _, text in lines)
+        reader = _reader([text + "\n" for _, text in lines], self.separator)
+        rows = reader if reader else (_split(text, self.separator) for _, text in lines)
+        try:
+            for k, row in enumerate(rows, 1):
+                line = lines[(reader.line_num if reader else k) - 1][0]
+                cells = [*map(str.strip, row)]
+                if not any(cells):
+                    self.blank.append(line)
+                    continue
+                if shown_as_it_is:
+                    cells = [_SHOWN_AS_IT_IS.sub(r"\1", cell) for cell in cells]
+                count += len(cells)
+                if len(cells) > widest or count > most:
+                    too_many = COLUMNS.exceeded(len(cells)) or CELLS.exceeded(count)
+                    raise DataDamaged(f"{self.path}, line {line}: {too_many}")
+                kept.append((line, cells))
+        except (csv.Error, ValueError) as error:
+            line = lines[max(0, min(reader.line_num, len(lines)) - 1)][0]
+            raise DataDamaged(f"{self.path}, line {line}: {error}") from None
+        used = longest = max((len(row) for _, row in kept), default=0)
         while used and not any(any(row[used - 1 :]) for _, row in kept):
             used -= 1
+        self.separated = {number for number, row in kept if len(row) == used == longest - 1 and not row[-1]}
         return [(number, row[:used]) for number, row in kept]
 
     def _header(self) -> _Header:
@@ -244,15 +277,20 @@ class _Layout:
             self.rows[0] = (line, top)
         numeric = _numeric_columns(sample[: max(2, _SAMPLED_SIZE // width)], width)
         data = next((k for k, (_, row) in enumerate(self.rows) if _is_data(row, width, numeric)), None)
-        data = self._without_kinds(data, numeric)
-        if data is not None and (names := self._second_names(data, width, numeric)):
-            return self._header_before(names + 1, width, numeric)
-        if data is None or (data == 1 and len(top) > max(1, width - 2) and not _are_numbers(top)):
+        if data is None:
             return _Header(top, None, 1, line)
-        named = data == 0 and not (_are_numbers(top) or self._is_as_below(top, numeric))
-        if named and not self._names_in_comment(width, 0):
+        if names := self._second_names(data, width, numeric):
+            data = names + 1
+        above = self._names_in_comments(width, self.rows[data][0])
+        plain, self.rows = self.rows, sorted([*self.rows, *above])
+        begin = data + len(above)
+        if header := self._joined_names(begin, width) or self._names_in_row(begin, width, numeric):
+            return header
+        self.rows = plain
+        likely = len(top) > max(1, width - 2) if data else not self._is_as_below(top, numeric)
+        if data < 2 and likely and not _are_numbers(top):
             return _Header(top, None, 1, line)
-        return self._header_before(data, width, numeric)
+        return self._without_names(data, width)
 
     def _is_as_below(self, top: Sequence[str], numeric: frozenset[int]) -> bool:
         """Return whether a cell of the first row is no name: a text that its column has below, or a time."""
@@ -260,65 +298,62 @@ class _Layout:
         cells = [(k, cell) for k, cell in enumerate(top) if k not in numeric and cell]
         return any(item in texts or seconds_since_first([item[1]]) is not None for item in cells)
 
-    def _without_kinds(self, data: int | None, numeric: frozenset[int]) -> int | None:
-        """Return the first row of numbers, after leaving out those that say of which kinds the columns are."""
-        for k in range(1, data or 0):
-            kinds = {cell.lower() for c, cell in enumerate(self.rows[k][1]) if c in numeric} - {""}
-            named = any(len(kind) > 1 for kind in kinds) or ("c" in kinds and self.rows[k + 1 : data])
-            if named and all(map(_KIND.fullmatch, kinds)):
-                self._tell([number for number, _ in self.rows[k:data]], "line on the kinds of columns")
-                del self.rows[k:data]
-                return k
-        return data
-
     def _second_names(self, data: int, width: int, numeric: frozenset[int]) -> int | None:
         """Return the last row of names behind a few rows of numbers, as those of a summary; None if there is none."""
-        most = data + max(_FEW_BEFORE, int(_MOST_BEFORE * len(self.rows)))
+        most = max(_FEW_BEFORE, int(_MOST_BEFORE * len(self.rows)))
+        near = pairwise(self.rows[data + 1 : data + 2 * most + 2])
         named = [
             k
-            for k, ((_, row), (_, following)) in enumerate(pairwise(self.rows[data + 1 : most + 2]), data + 1)
+            for k, ((_, row), (_, following)) in enumerate(near, data + 1)
             if len(row) > 1
             and not any(is_number(row[c]) or is_missing(row[c]) for c in numeric if c < len(row))
             and _can_be_names(row, width, [set()] * width)
             and all(row != earlier for _, earlier in self.rows[:data])
             and _is_data(following, width, numeric)
+            and sum(_is_data(above, width, numeric) for _, above in self.rows[data:k]) <= most
         ]
         return named[-1] if named else None
 
-    def _header_before(self, data: int, width: int, numeric: frozenset[int]) -> _Header:
-        """Return where the names are if `data` rows come before the numbers. Raises DataDamaged if none has names."""
-        if joined := self._joined_names(data, width):
-            return joined
+    def _names_in_row(self, data: int, width: int, numeric: frozenset[int]) -> _Header | None:
+        """Return the names in one of the rows before the numbers, None if none has names. Raises DataDamaged.
+
+        Units, or the kinds of the columns, come behind the names, and remarks on the columns may come behind these.
+        """
         head = [row for _, row in self.rows[:data]]
         below = [row for _, row in self.rows[data:] if row not in head]
         texts = [set() if k in numeric else {row[k] for row in below if k < len(row)} for k in range(width)]
-        able = [k for k in range(data) if _can_be_names(self.rows[k][1], width, texts)]
-        if not able:
-            return self._names_in_comment(width, data) or self._without_names(data, width)
-        # Units come behind the names, and remarks on the columns may come behind the units.
-        with_units = [
+        able = [k for k in range(data) if _can_be_names(head[k], width, texts)]
+        above_units = [
             k
             for k in able
             if k + 1 < data
-            and len(self.rows[k][1]) <= len(self.rows[k + 1][1])
-            and _are_units(self.rows[k + 1][1])
-            and not _are_units(self.rows[k][1])
-            and {*range(k + 2, data)} <= {*able}
+            and len(head[k]) <= len(head[k + 1])
+            and (_are_units(head[k + 1]) or _are_kinds(head[k + 1], followed=k + 2 < data))
+            and not _are_units(head[k])
+            and not any(map(is_number, chain(*head[k + 2 :])))
         ]
-        names = (with_units or able)[-1]
-        above = self.rows[names - 1][1] if names and not with_units else []
-        units = (
-            self.rows[names + 1][1]
-            if with_units
-            else above
-            if len(above) == width and _are_units(above)
-            else None
-        )
-        if skipped := [number for number, row in self.rows[:names] if row is not units]:
-            self._refuse_numbers_before(names)
-            self.notes.append(f"the names of the columns are those of line {self.rows[names][0]}")
+        if not able:
+            return None
+        names = (above_units or able)[-1]
+        line, row = self.rows[names]
+        beside = head[names + 1] if above_units else None
+        if names and not above_units and len(head[names - 1]) == width and _are_units(head[names - 1]):
+            beside = head[names - 1]
+        kinds = beside is not None and _are_kinds(beside, followed=names + 2 < data)
+        plain = {number for number, _ in self.rows[:names]} - {number for number, _ in self.comments}
+        if skipped := [number for number, row in self.rows[:names] if number in plain and row is not beside]:
+            numbers = [number for number, row in self.rows[:names] if len(row) > 1 and _are_numbers(row)]
+            if len(numbers) > max(_FEW_BEFORE, _MOST_BEFORE * (len(self.rows) - names)):
+                raise DataDamaged(
+                    f"{self.path}: line {line} names the columns of the lines after it, and {len(numbers)} lines of "
+                    f"numbers come before it, from line {numbers[0]} on: are these two tables? Divide the file, or say "
+                    'in a manifest which line begins each grasp: start = "a text in that line"'
+                )
+            self.notes.append(f"the names of the columns are those of line {line}")
             self._tell(skipped, "line before them")
-        return _Header(self.rows[names][1], units, data if with_units else names + 1, self.rows[names][0])
+        if kinds:
+            self._tell((number for number, row in self.rows if row == beside), "line on the kinds of columns")
+        return _Header(row, None if kinds else beside, data if above_units else names + 1, line, beside)
 
     def _without_names(self, data: int, width: int) -> _Header:
         """Return names for numbers without any. Raises DataDamaged if lines before them may have names."""
@@ -351,6 +386,7 @@ class _Layout:
         has_first = any(row[0] for row in levels)
         named = any(_names_all(row) and (row[0] or not has_first) for row in levels)
         named &= len(levels) < 3 or any(levels[-1][1:])  # else pandas names the index below its levels
+        named |= any(_are_kinds(row, followed=True) for row in levels)
         if len(levels) < 2 or named or any(map(is_number, chain(*levels))):
             return None
         *upper, lowest = levels
@@ -369,36 +405,17 @@ class _Layout:
         )
         return _Header(names, units, data, lines[-1])
 
-    def _refuse_numbers_before(self, names: int) -> None:
-        """Raise DataDamaged if rows of numbers that may be a part of the data come before the row `names`."""
-        numbers = [number for number, row in self.rows[:names] if len(row) > 1 and _are_numbers(row)]
-        if len(numbers) > max(_FEW_BEFORE, _MOST_BEFORE * (len(self.rows) - names)):
-            raise DataDamaged(
-                f"{self.path}: line {self.rows[names][0]} names the columns of the lines after it, and {len(numbers)} "
-                f"lines of numbers come before it, from line {numbers[0]} on: are these two tables? Divide the file, "
-                'or say in a manifest which line begins each grasp: start = "a text in that line"'
-            )
-
-    def _names_in_comment(self, width: int, data: int) -> _Header | None:
-        """Return the names and the units that comments before this row have; None if none has names.
-
-        Units stand in the last comment.
-        """
-        begin = self.rows[data][0]
+    def _names_in_comments(self, width: int, begin: int) -> list[Row]:
+        """Return the comments before this line that have a name, or a unit, for each column."""
         above = [(number, self._cells(line, width)) for number, line in self.comments if number < begin]
-        units = None
-        if len(above) > 1 and len(above[-1][1]) == width and _are_units(above[-1][1]):
-            units = above.pop()[1]
-        # As many words as columns can be a remark.
-        for number, cells in above[-1:] if self.separator == " " else reversed(above):
-            if len(cells) == width and _names_all(cells) and not any(map(is_number, cells)):
-                self._tell([line for line, _ in self.rows[:data]], "line before the numbers")
-                return _Header(cells, units, data, number)
-        return None
+        if self.separator == " ":  # as many words as columns can be a remark
+            above = above[-2:] if above and _are_units(above[-1][1]) else above[-1:]
+        able = [len(cells) == width and (_names_all(cells) or _are_units(cells)) for _, cells in above]
+        return list(compress(above, able))
 
     def _cells(self, comment: str, width: int) -> list[str]:
         """Return the names in a text, which may separate so many words by another sign than the rows do."""
-        text = comment.strip().lstrip("#%/! ")
+        text = comment.lstrip("#%/! \t").rstrip(";,|\t ")
         for separator in _SEPARATORS if self.separator in _SPACES else _SEPARATORS[: -len(_SPACES)]:
             cells = _split(text, separator)
             whole = separator == self.separator or not any(" " in cell for cell in cells)
@@ -413,33 +430,54 @@ class _Layout:
         several = what.replace("line ", "lines ", 1) if what.startswith("line ") else f"{what}s"
         self.notes += [f"left out: {counted(len(lines), what, several)} (line {some})"] if lines else []
 
+    def _tell_cut(self, number: int) -> None:
+        """Note that the last line is not whole."""
+        self.notes.append(f"line {number} is cut off, and left out")
+        self.ended = True
+
     def _without_repeats(
-        self, rows: list[Row], names: Sequence[str], units: Sequence[str] | None
+        self, rows: list[Row], names: Sequence[str], beside: Sequence[str] | None
     ) -> list[Row]:
-        """Return the rows that are not the header again."""
+        """Return the rows that are not the header again, nor the row beside it."""
         folded = [name.casefold() for name in names]
         again = {number for number, row in rows if [cell.casefold() for cell in row] == folded}
         if not again or all(map(is_number, names)):
             return rows
         self._tell(again, "repeated header")
-        return [row for row in rows if row[0] not in again and row[1] != units]
+        return [row for row in rows if row[0] not in again and row[1] != beside]
 
     def _without_texts(self, rows: list[Row], width: int) -> list[Row]:
-        """Return the rows without lines of text, as a device prints one between its numbers, or several behind them."""
+        """Return the rows without lines of text, as a device prints one between its numbers, or several behind them.
+
+        Behind are words in place of a time, or of a number in the last lines that stand apart, and several words where
+        numbers are expected, and no number there.
+        """
         sample = _sample([row for _, row in rows])
         numeric = _numeric_columns(sample, width)
-        rises = 0 in numeric and _rise([row[0] for row in sample if is_number(row[0])])
-        behind = takewhile(lambda row: _is_text_behind(row[1], width, numeric, rises=rises), reversed(rows))
+        times = columns_of_numbers({"": [row[0] for row in sample if is_number(row[0])]})[""]
+        # As times and the numbers of rows do; labels and features do not.
+        rises = (
+            not isinstance(times, NotNumbers) and len(times) > _FEW_BEFORE and all(map(lt, times, times[1:]))
+        )
+        apart = max((line for (above, _), (line, _) in pairwise(rows) if line > above + 1), default=math.inf)
+
+        def is_text(line: Row) -> bool:
+            number, row = line
+            there = [row[k] for k in numeric if k < len(row) and not is_missing(row[k])]
+            words = 0 in numeric and (rises or number >= apart)
+            words = words and not (is_missing(row[0]) or re.search(r"\d", row[0]))
+            return words or (len(row) == width and len(there) > 1 and not any(map(is_number, there)))
+
         texts = {number for number, row in rows if len(row) < width and not any(map(is_number, row))}
-        texts |= {number for number, _ in behind}
+        texts |= {number for number, _ in takewhile(is_text, reversed(rows))}
         if not 0 < len(texts) <= max(_FEW_BEFORE, _MOST_BEFORE * len(rows)):
             return rows
         self._tell(texts, "line of text")
         return [row for row in rows if row[0] not in texts]
 
-    def _without_cut(self, rows: list[Row], width: int, ended: bool) -> list[Row]:
+    def _without_cut(self, rows: list[Row], width: int) -> list[Row]:
         """Return the rows without a last one that was cut off while it was written."""
-        if ended or len(rows) < 4:
+        if self.ended or len(rows) < 4:
             return rows
         number, last = rows[-1]
         ends = [row[-1] for _, row in rows[:-1] if len(row) == width]
@@ -448,7 +486,7 @@ class _Layout:
         # An empty last cell may be a missing value, as in other rows.
         if len(last) == width and (last[-1] or not all(ends)) and not shorter:
             return rows
-        self.notes.append(f"line {number} is cut off, and left out")
+        self._tell_cut(number)
         return rows[:-1]
 
 
@@ -480,10 +518,11 @@ def _with_remarks(rows: list[Row]) -> list[Row]:
     return [(number, [*row, ""] if len(row) == width - 1 else row) for number, row in rows]
 
 
-def _begin_with_names(rows: Sequence[Row], width: int) -> bool:
+def _begin_with_names(rows: Sequence[Row], width: int, in_quotes: Container[int]) -> bool:
     """Return whether all rows have so many cells, and number or name themselves in the first, as those of R do.
 
-    Numbers that R has sorted are in another order; from the last to the first, they can be measured.
+    Numbers that R has sorted are in another order; from the last to the first, they can be measured. Of a part of
+    the rows, they are names if they alone are `in_quotes`, in these lines.
     """
     names, n = [row[0] for _, row in rows if len(row) == width], len(rows)
     if len(set(names)) < max(n, 2):
@@ -491,7 +530,8 @@ def _begin_with_names(rows: Sequence[Row], width: int) -> bool:
     if not any(map(is_number, names)):
         return n > _FEW_BEFORE
     counted = {*names} in ({*map(str, range(n))}, {*map(str, range(1, n + 1))})
-    return counted and names != sorted(names, key=int, reverse=True)
+    measured = not counted or names == sorted(names, key=int, reverse=True)
+    return not measured or all(number in in_quotes for number, _ in rows)
 
 
 def numbers_with_unit(cells: Sequence[str], of_column: str = "") -> tuple[Sequence[str], str]:
@@ -587,6 +627,13 @@ def _separator(lines: Sequence[str]) -> str:
     return max(agreeing, key=lambda separator: agreeing[separator], default="\x1f")
 
 
+def _reader(lines: Iterable[str], separator: str) -> Any:
+    """Return the reader of lines that a sign separates, None for spaces."""
+    if separator in _SPACES:
+        return None
+    return csv.reader(lines, delimiter=separator, skipinitialspace=True, strict=True)
+
+
 def _split(line: str, separator: str) -> list[str]:
     """Return the cells of a line; none if it cannot be divided. Spaces within quotes are of their word."""
     if separator == "  ":
@@ -594,7 +641,7 @@ def _split(line: str, separator: str) -> list[str]:
     if separator == " ":
         return [quoted or word for quoted, word in re.findall(r'"([^"]*)"(?!\S)|(\S+)', line)]
     try:
-        return [*map(str.strip, next(csv.reader([line], delimiter=separator, skipinitialspace=True), []))]
+        return [*map(str.strip, next(_reader([line], separator), []))]
     except (csv.Error, ValueError):
         return []
 
@@ -627,20 +674,6 @@ def _is_data(row: Sequence[str], width: int, numeric: frozenset[int]) -> bool:
     return len(row) == width and bool(there) and all(map(is_number, there))
 
 
-def _rise(cells: Sequence[str]) -> bool:
-    """Return whether numbers rise from row to row, as times and the numbers of rows do, and labels and features not."""
-    numbers = columns_of_numbers({"": cells})[""]
-    rise = not isinstance(numbers, NotNumbers) and all(map(lt, numbers, numbers[1:]))
-    return len(cells) > _FEW_BEFORE and rise
-
-
-def _is_text_behind(row: Sequence[str], width: int, numeric: frozenset[int], *, rises: bool) -> bool:
-    """Return whether a row has words in place of a time, or several where numbers are expected, and no number there."""
-    there = [row[k] for k in numeric if k < len(row) and not is_missing(row[k])]
-    words = rises and not (is_missing(row[0]) or re.search(r"\d", row[0]))
-    return words or (len(row) == width and len(there) > 1 and not any(map(is_number, there)))
-
-
 def _can_be_names(row: Sequence[str], width: int, texts: Sequence[set[str]]) -> bool:
     """Return whether a row can name so many columns: different texts, and none that a column of text has below."""
     named = [cell for cell in row if cell]
@@ -665,6 +698,13 @@ def _are_units(row: Sequence[str]) -> bool:
         cell for cell in named if cell.strip("[]()").lower() in UNITS or cell[0] + cell[-1] in ("[]", "()")
     ]
     return bool(named) and 2 * len(units) > len(named)
+
+
+def _are_kinds(row: Sequence[str], *, followed: bool) -> bool:
+    """Return whether a row says of which kinds the columns are; letters alone are units, if numbers follow."""
+    kinds = {cell.lower() for cell in row} - {""}
+    named = any(len(kind) > 1 for kind in kinds) or ("c" in kinds and followed)
+    return named and all(map(_KIND.fullmatch, kinds))
 
 
 def _decimals(cell: str) -> int:
@@ -770,8 +810,7 @@ def _readings(data: bytes, place: int) -> str:
     readings: dict[str, str] = {}
     for code_page in _CODE_PAGES:
         reading = cell.decode(code_page, "replace")
-        letters = [letter for letter in reading if letter.isalpha()]
-        scripts = {unicodedata.name(letter, "").split()[0] for letter in letters}
-        if len(scripts) == 1 and all(sign.isascii() or sign in letters for sign in reading):
+        signs = (sign for sign in reading if sign.isalpha() or not sign.isascii())
+        if len({unicodedata.name(sign, "").partition(" ")[0] for sign in signs}) == 1:  # of one script
             readings.setdefault(reading, code_page)
     return listed([f"{reading} ({code_page})" for reading, code_page in readings.items()])

@@ -9,7 +9,7 @@ from __future__ import annotations
 import fnmatch
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -100,7 +100,11 @@ def read_labelled(
         recorded = lines if ranks is None else sorted(lines, key=ranks.__getitem__)
         notes += [] if order is not None else [_no_order(columns, reserved, identified)]
         notes += doubts(columns, labels, table, target, recorded)
-        notes += _not_held_out(_sessions(columns, others, instances))
+        notes += [
+            f"not held out: trials of one {name} are in training and test data. If it matters, a further {name} is "
+            f"recognised less often than told; {option('instance', name)} holds it out"
+            for name in _sessions(columns, others, instances)
+        ]
     return Labelled(
         source=str(path),
         table=table,
@@ -116,14 +120,6 @@ def read_labelled(
         notes=tuple(notes),
         provenance={"simulated": export is not None and "1" in columns.cells["simulated"]},
     )
-
-
-def _not_held_out(names: Iterable[str]) -> Iterator[str]:
-    for name in names:
-        yield (
-            f"not held out: trials of one {name} are in training and test data. If it matters, a further {name} is "
-            f"recognised less often than told; {option('instance', name)} holds it out"
-        )
 
 
 def _opened(
