@@ -364,9 +364,10 @@ def test_the_code_of_a_plugin_counts_with_what_it_imports_and_names(tmp_path, mo
         known.append(content())
     monkeypatch.setenv("lab_scale", "2")
     assert content() not in known
-    developed = input_content.developed_code("my_plugin.law")
-    (tmp_path / "src" / "my_plugin" / "law.py").write_text("a = 333")
-    assert input_content.developed_code("my_plugin.law") not in ("", developed)
+    for name in ("helper.py", "my_plugin/law.py"):
+        developed = input_content.developed_code("my_plugin.law")
+        (tmp_path / "src" / name).write_text("a = 333")
+        assert input_content.developed_code("my_plugin.law") not in ("", developed)
     assert input_content.developed_code("attrs.anything") == ""
 
 

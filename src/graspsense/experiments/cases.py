@@ -32,6 +32,7 @@ from graspsense.experiments.experiment import (
 )
 from graspsense.experiments.kinds import kind_of
 from graspsense.sources.identified import IDENTIFIED, identified_scenes
+from graspsense.sources.input_content import contents_of
 from graspsense.sources.simulated import number_of_trials as number_of_simulated_trials
 from graspsense.sources.simulated import simulated_objects
 from graspsense.sources.trial_source import (
@@ -340,14 +341,21 @@ def _what_matters(case: ExperimentCase, inert: set[str]) -> str:
     return repr(params)
 
 
+_COUNTED: Final[dict[str, int]] = {}
+"""Numbers of trials by table and content: every case of an experiment asks for that of the same table."""
+
+
 def number_of_trials(settings: Settings, data: TrialSource) -> int | None:
     """Return the number of trials of a source, None for a data set, which would have to be read."""
     if data.kind == SIMULATED:
         return number_of_simulated_trials(settings, groups_of(data))
-    if data.kind == "CSV":
+    if data.kind != "CSV":
+        return None
+    table = repr((data, contents_of([data.source], code=False)))
+    if table not in _COUNTED:
         trials = labelled_trials(data, settings=lambda: settings, features=settings.features.create)
-        return len(without_copies(trials))
-    return None
+        _COUNTED[table] = len(without_copies(trials))
+    return _COUNTED[table]
 
 
 def in_a_name(key: str, value: Any) -> str:

@@ -82,8 +82,9 @@ def tables_without_effect(source: TrialSource) -> tuple[str, ...]:
 
 
 def keys_without_effect(source: TrialSource) -> tuple[str, ...]:
-    """Return the keys of a source that its trials do not depend on, because they are for another kind."""
-    return tuple(key for kind, keys in KEYS_OF_KIND.items() if kind != source.kind for key in keys)
+    """Return the keys of a source that its trials do not depend on, because they are for other kinds."""
+    others = (key for kind, keys in KEYS_OF_KIND.items() if kind != source.kind for key in keys)
+    return (*others, "checkpoints_s") if source.kind == "CSV" else tuple(others)
 
 
 NO_OBJECT: Final = "an empty list names no object: leave it out for the default ones, or name some"
