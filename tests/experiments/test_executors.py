@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -90,47 +91,17 @@ class Lab:
         """Return how many tasks are being done and wait to be told to go on."""
         return len(list((self.folder / "plugin" / "marks").glob("waits-*")))
 
-    def go(self):
-        (self.folder / "plugin" / "marks.go").touch()
+    def tell(self, word):
+        (self.folder / "plugin" / f"marks.{word}").touch()
+
+    def tell_nothing(self):
+        for told in (self.folder / "plugin").glob("marks.*"):
+            told.unlink()
 
 
 @pytest.fixture
 def lab(tmp_path):
     return Lab(tmp_path, wayward.install(tmp_path / "plugin"))
-
-
-@pytest.mark.parametrize("executor", ["processes", "dask"])
-def test_whatever_a_task_does_the_others_are_kept(lab, executor, request):
-    lab.write("fine", "kills", "kills once", "raises", "prints", "exits")
-    if executor == "dask":
-        _, address, worker = request.getfixturevalue("cluster")
-        worker(), worker()
-        executor = f"dask:{address}"
-    how = ("-o", "seeds=1", "--workers", "2", "--executor")
-    summary, _ = lab.run("out", *how, executor, ends=1)
-
-    assert summary["stopped"] is None
-    assert summary["missing"] == 0
-    done = {name: result is not None for name, result in lab.results("out").items()}
-    expected = {
-        "fine": True,
-        "kills once": True,
-        "prints": True,
-        "kills": False,
-        "raises": False,
-        "exits": False,
-    }
-    assert done == {f"{name}, seed 0": whether for name, whether in expected.items()}
-    reasons = {failure["task"]: failure["reason"] for failure in summary["failed"]}
-    assert "Unpicklable" in reasons["raises, seed 0"]
-    assert re.fullmatch(r"SystemExit: 3 in plugin/wayward\.py:[0-9]+", reasons["exits, seed 0"])
-    assert "its worker" in reasons["kills, seed 0"]
-
-    kept = lab.results("out")
-    (lab.folder / "plugin" / "marks.tamed").touch()
-    summary, _ = lab.run("out", *how, "processes", "--resume")
-    assert (summary["kept"], summary["done"], summary["complete"]) == (3, 3, True)
-    assert all(lab.results("out")[name] == result for name, result in kept.items() if result)
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="needs SIGKILL")
@@ -142,7 +113,7 @@ def test_a_run_that_is_ended_goes_on_where_it_was(lab, how):
     process.send_signal(getattr(signal, how))
     process.wait(300)
     if how == "SIGKILL":
-        lab.go()  # a worker whose run is gone ends with its task
+        lab.tell("go")  # a worker whose run is gone ends with its task
     stdout, _ = process.communicate(timeout=300)
     if how != "SIGKILL":
         assert process.returncode == 130
@@ -150,8 +121,8 @@ def test_a_run_that_is_ended_goes_on_where_it_was(lab, how):
         assert summary["stopped"] == "interrupted"
         assert 1 <= summary["done"] < 4
     results = lab.results("out")
-    lab.go()
-    summary, _ = lab.run("out", "--executor", "processes", "--workers", "2", "--resume")
+    lab.tell("go")
+    summary, _ = lab.run("out", "--executor", "serial", "--resume")
     assert summary["kept"] == len(results) < 4
     assert summary["complete"]
     if how == "SIGKILL":
@@ -159,16 +130,17 @@ def test_a_run_that_is_ended_goes_on_where_it_was(lab, how):
         assert lab.results("out") == lab.results("undisturbed")
 
 
-@pytest.fixture
-def cluster(lab):
-    """Start a real scheduler and two workers, as processes of their own."""
+@contextmanager
+def scheduled(lab):
+    """Start a real scheduler as a process of its own; yield it, its address, and what starts a worker of it."""
     pytest.importorskip("distributed", reason="Dask is not installed")
     started = []
 
     def start(*arguments, **environ):
         process = subprocess.Popen(
             [sys.executable, "-m", "distributed.cli." + arguments[0], *arguments[1:]],
-            env={**lab.environ, **environ},
+            # A task that ended its worker comes back at once: trying it again is ours.
+            env={**lab.environ, "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "0", **environ},
             cwd=lab.folder,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
@@ -195,13 +167,64 @@ def cluster(lab):
         process.wait(300)
 
 
-def test_a_cluster_of_two_workers_gives_what_one_process_gives(lab, cluster):
-    _, address, worker = cluster
+@pytest.fixture(scope="module")
+def shared_cluster(tmp_path_factory):
+    """Two workers take several seconds to start: every test that harms no scheduler has the same ones."""
+    folder = tmp_path_factory.mktemp("cluster")
+    lab = Lab(folder, wayward.install(folder / "plugin"))
+    with scheduled(lab) as (scheduler, address, worker):
+        worker(), worker()
+        yield lab, scheduler, address
+
+
+@pytest.fixture
+def cluster(shared_cluster):
+    """A folder with a plugin, and a scheduler with two workers that have it."""
+    shared_cluster[0].tell_nothing()
+    return shared_cluster
+
+
+@pytest.mark.parametrize("executor", ["processes", "dask"])
+def test_whatever_a_task_does_the_others_are_kept(executor, request):
+    if executor == "dask":
+        lab, _, address = request.getfixturevalue("cluster")
+        executor = f"dask:{address}"
+    else:
+        lab = request.getfixturevalue("lab")
+    lab.write("fine", "kills", "kills once", "raises", "prints", "exits")
+    how = ("-o", "seeds=1", "--workers", "2", "--executor")
+    summary, _ = lab.run("out", *how, executor, ends=1)
+
+    assert summary["stopped"] is None
+    assert summary["missing"] == 0
+    done = {name: result is not None for name, result in lab.results("out").items()}
+    expected = {
+        "fine": True,
+        "kills once": True,
+        "prints": True,
+        "kills": False,
+        "raises": False,
+        "exits": False,
+    }
+    assert done == {f"{name}, seed 0": whether for name, whether in expected.items()}
+    reasons = {failure["task"]: failure["reason"] for failure in summary["failed"]}
+    assert "Unpicklable" in reasons["raises, seed 0"]
+    assert re.fullmatch(r"SystemExit: 3 in plugin/wayward\.py:[0-9]+", reasons["exits, seed 0"])
+    assert "its worker" in reasons["kills, seed 0"]
+
+    kept = lab.results("out")
+    lab.tell("tamed")
+    summary, _ = lab.run("out", *how, "serial", "--resume")
+    assert (summary["kept"], summary["done"], summary["complete"]) == (3, 3, True)
+    assert all(lab.results("out")[name] == result for name, result in kept.items() if result)
+
+
+def test_a_cluster_of_two_workers_gives_what_one_process_gives(cluster):
+    lab, _, address = cluster
     lab.write("fine")
     (lab.folder / "it.toml").write_text(
         EXPERIMENT.format(variants="").replace('["wayward"]', '["c45"]').replace("seeds = 2", "seeds = 3")
     )
-    worker(), worker()
     lab.run("dask", "--executor", f"dask:{address}")
     lab.run("serial", "--executor", "serial")
 
@@ -209,12 +232,12 @@ def test_a_cluster_of_two_workers_gives_what_one_process_gives(lab, cluster):
     assert lab.results("dask") == lab.results("serial")
 
 
-def test_a_scheduler_that_is_stopped_ends_the_run_with_an_account(lab, cluster):
-    scheduler, address, worker = cluster
+def test_a_scheduler_that_is_stopped_ends_the_run_with_an_account(cluster):
+    """The last test with it."""
+    lab, scheduler, address = cluster
     lab.write("fine", "waits")
-    worker(), worker()
-    process = lab.start("out", "--executor", f"dask:{address}")
-    lab.until(lambda: len(lab.results("out")) >= 1 and lab.waiting() >= 1, process)
+    process = lab.start("stopped", "--executor", f"dask:{address}")
+    lab.until(lambda: len(lab.results("stopped")) >= 1 and lab.waiting() >= 1, process)
     os.killpg(scheduler.pid, signal.SIGKILL)
     stdout, stderr = process.communicate(timeout=300)
 
@@ -222,17 +245,17 @@ def test_a_scheduler_that_is_stopped_ends_the_run_with_an_account(lab, cluster):
     summary = json.loads(stdout)
     assert "scheduler" in summary["stopped"]
     assert summary["done"] >= 1
-    lab.go()
-    summary, _ = lab.run("out", "--executor", "serial", "--resume")
+    lab.tell("go")
+    summary, _ = lab.run("stopped", "--executor", "serial", "--resume")
     assert summary["kept"] >= 1
     assert summary["complete"]
 
 
-def test_workers_with_other_versions_are_refused(lab, cluster):
-    _, address, worker = cluster
+def test_workers_with_other_versions_are_refused(lab):
     lab.write("fine")
-    worker(PYTHONPATH="")
-    _, stderr = lab.run("out", "--executor", f"dask:{address}", ends=2)
+    with scheduled(lab) as (_, address, worker):
+        worker(PYTHONPATH="")
+        _, stderr = lab.run("out", "--executor", f"dask:{address}", ends=2)
 
     assert re.search(r"wayward: 0\.3\+[0-9a-f]{8} here, not installed", stderr)
 
