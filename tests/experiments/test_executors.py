@@ -52,6 +52,9 @@ class Lab:
     environ: dict[str, str]
 
     def write(self, *hows):
+        """Write an experiment with these cases, of which none has been told anything yet."""
+        for told in (self.folder / "plugin").glob("marks.*"):
+            told.unlink()
         variants = "\n".join(f'[[variants]]\nname = "{how}"\nclassifier.how = "{how}"' for how in hows)
         (self.folder / "trials.csv").write_text(wayward.CSV)
         (self.folder / "it.toml").write_text(EXPERIMENT.format(variants=variants))
@@ -93,10 +96,6 @@ class Lab:
 
     def tell(self, word):
         (self.folder / "plugin" / f"marks.{word}").touch()
-
-    def tell_nothing(self):
-        for told in (self.folder / "plugin").glob("marks.*"):
-            told.unlink()
 
 
 @pytest.fixture
@@ -168,8 +167,8 @@ def scheduled(lab):
 
 
 @pytest.fixture(scope="module")
-def shared_cluster(tmp_path_factory):
-    """Two workers take several seconds to start: every test that harms no scheduler has the same ones."""
+def cluster(tmp_path_factory):
+    """A folder with a plugin, and a scheduler with its address and two workers, which take seconds to start."""
     folder = tmp_path_factory.mktemp("cluster")
     lab = Lab(folder, wayward.install(folder / "plugin"))
     with scheduled(lab) as (scheduler, address, worker):
@@ -177,20 +176,13 @@ def shared_cluster(tmp_path_factory):
         yield lab, scheduler, address
 
 
-@pytest.fixture
-def cluster(shared_cluster):
-    """A folder with a plugin, and a scheduler with two workers that have it."""
-    shared_cluster[0].tell_nothing()
-    return shared_cluster
-
-
 @pytest.mark.parametrize("executor", ["processes", "dask"])
 def test_whatever_a_task_does_the_others_are_kept(executor, request):
-    if executor == "dask":
+    if executor == "processes":
+        lab = request.getfixturevalue("lab")
+    else:
         lab, _, address = request.getfixturevalue("cluster")
         executor = f"dask:{address}"
-    else:
-        lab = request.getfixturevalue("lab")
     lab.write("fine", "kills", "kills once", "raises", "prints", "exits")
     how = ("-o", "seeds=1", "--workers", "2", "--executor")
     summary, _ = lab.run("out", *how, executor, ends=1)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -56,7 +55,7 @@ class ExportedTable:
         cells = self.columns.cells
         keys = [key for key in ("recorded_at", "order") if key in self.about]
         labels = [
-            json.dumps({key: cells[key][i] for key in keys if not is_missing_label(cells[key][i])})
+            {key: cells[key][i] for key in keys if not is_missing_label(cells[key][i])}
             for i in range(len(self.columns))
         ]
         return order_recorded(cells["made_at"], cells["origin"], labels)
