@@ -459,6 +459,8 @@ def test_what_is_no_file_is_no_input():
         ('"features.type" = ["chitta", "curve"]', "features.type"),
         ('"run.hold_s" = [0.1, 0.2]', "run.hold_s"),
         ('"data.instances" = [2, 3]', "data.instances"),
+        ('"data.checkpoints_s" = [[0.1], [0.2]]', "data.checkpoints_s"),
+        ('"judge.folds" = [2, 3]\n[test]\nsource = "t.csv"\nlabel = "what"', "judge.folds"),
     ],
 )
 def test_a_sweep_without_effect_on_a_table_is_refused(tmp_path, sweep, key):

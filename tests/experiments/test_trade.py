@@ -124,7 +124,8 @@ def summary_of(folder, kind, more):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "more"),
-    [("early", "moments_s = [0.0, 1.0]"), ("squeezes", "most = 2"), ("physics", "error = 0.1")],
+    # That of the physics is run whole by `test_a_trade_off_is_the_one_of_today`.
+    [("early", "moments_s = [0.0, 1.0]"), ("squeezes", "most = 2")],
 )
 def test_each_trade_runs_and_gives_advice(tmp_path, kind, more):
     summary = summary_of(tmp_path, kind, more)

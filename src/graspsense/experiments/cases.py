@@ -126,18 +126,23 @@ class CasePlan:
                     for source in sources
                 )
             )
+            if case.test is not None:
+                inert |= {f"judge.{key}" for key in getattr(case.judge, "of_folds", ())}
             named = " and ".join(source.source for source in sources)
             keys = [dotted(path) for path in sweep if {path[0], dotted(path[:2])} & inert]
             twin = seen.setdefault(_what_matters(case, inert), case)
             if not keys and twin is not case:
                 keys = [key for key in case.levels if case.levels[key] != twin.levels[key]]
             for key in keys:
-                why = (
-                    _SEEDS
-                    if key == "run.seed"
-                    else f"the trials of {named} do not depend on what differs. Vary a key of [classifier], [judge] or "
-                    f'[data] that they depend on, or simulate the trials (data.source = "{SIMULATED}")'
-                )
+                if key == "run.seed":
+                    why = _SEEDS
+                elif key.startswith("judge."):
+                    why = f"all trials of {named} are learned from or tested on, without folds and controls"
+                else:
+                    why = (
+                        f"the trials of {named} do not depend on what differs. Vary a key of [classifier], [judge] or "
+                        f'[data] that they depend on, or simulate the trials (data.source = "{SIMULATED}")'
+                    )
                 self.complaints.append(
                     f"{self.layer.where(('sweep', key))}: {key} makes no difference: {why}"
                 )
@@ -216,6 +221,10 @@ class CasePlan:
             simulated_objects(settings)
         kind = kind_of(experiment.kind)
         if data is not None and kind.declared.entry.simulates:
+            if test is not None:
+                self._complain(
+                    ("test",), f"experiments of the kind {experiment.kind!r} test on trials of [data] alone"
+                )
             try:
                 groups_of(data)
             except ConfigError as error:
@@ -335,9 +344,9 @@ def _what_matters(case: ExperimentCase, inert: set[str]) -> str:
     params = case.params
     params["settings"]["run"].pop("seed", None)  # a task has the seed of the experiment
     params["settings"] = {table: keys for table, keys in params["settings"].items() if table not in inert}
-    for name in ("data", "test"):
+    for name, table in (("data", "data"), ("test", "data"), ("judge", "judge")):
         keys = params[name] or {}
-        params[name] = {key: value for key, value in keys.items() if f"data.{key}" not in inert}
+        params[name] = {key: value for key, value in keys.items() if f"{table}.{key}" not in inert}
     return repr(params)
 
 
