@@ -63,15 +63,13 @@ def test_a_gripper_with_nothing_to_trade_is_refused(tmp_path):
     assert "no accuracy" in refused("tradeoff", "simulation", *options)
 
 
-@pytest.fixture
-def once(monkeypatch):
-    """Each variant is timed once: no test judges how fast it is."""
+@pytest.fixture(autouse=True)
+def _each_variant_is_timed_once(monkeypatch):
     monkeypatch.setattr(simulation, "LEAST_S", 0.0)
     monkeypatch.setattr(simulation, "LEAST_RUNS", 1)
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("once")
 def test_the_simulator_gets_better_with_finer_steps():
     few = ("--scene", "can:empty_open", "--seeds", "1", "--instances", "2")
     answer = answered("tradeoff", "simulation", *few)
@@ -113,7 +111,6 @@ def test_the_conclusion_says_whether_a_lower_accuracy_saves_time_or_costs_recogn
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("once")
 def test_without_a_classifier_errors_and_times_are_measured():
     few = ("--scene", "block", "--seeds", "1", "-o", "classifier.type=none")
     points = answered("tradeoff", "simulation", *few)["points"]

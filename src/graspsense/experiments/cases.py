@@ -40,10 +40,9 @@ from graspsense.sources.trial_source import (
     SIMULATED,
     TrialSource,
     groups_of,
-    keys_without_effect,
     labelled_trials,
     names_no_object,
-    tables_without_effect,
+    without_effect,
 )
 
 SWEPT_TABLES: Final = (*PIPELINE_TABLES, "classifier", "data", "test", "judge")
@@ -120,12 +119,7 @@ class CasePlan:
             sources = [source for source in (case.data, case.test) if source is not None]
             if self.complaints or not sources:
                 return
-            inert = set.intersection(
-                *(
-                    {*tables_without_effect(source), *(f"data.{key}" for key in keys_without_effect(source))}
-                    for source in sources
-                )
-            )
+            inert = set.intersection(*map(without_effect, sources))
             if case.test is not None:
                 inert |= {f"judge.{key}" for key in getattr(case.judge, "of_folds", ())}
             named = " and ".join(source.source for source in sources)

@@ -54,7 +54,7 @@ class ExportedTable:
         """Return the position of each trial in the order of recording, or None with the reason."""
         cells = self.columns.cells
         keys = [key for key in ("recorded_at", "order") if key in self.about]
-        labels = [
+        labels: list[dict[str, str]] = [
             {key: cells[key][i] for key in keys if not is_missing_label(cells[key][i])}
             for i in range(len(self.columns))
         ]
