@@ -107,8 +107,7 @@ def test_every_fault_in_every_phase_crushes_nothing(controller, faults, sides):
 
 
 def test_hostile_laws_crush_nothing(monkeypatch):
-    # Near the object each reaches the ceiling within 1.3 s, before the fingertip is stuck. From far away the one that
-    # oscillates takes 10 s for it.
+    # Near the object each reaches the ceiling within 1.3 s, before the fingertip is stuck; from far away, one in 10 s.
     run = evolve(gripper_faults.RUN, opening_timeout_s=1.0, grasp_timeout_s=1.0)
     monkeypatch.setattr(gripper_faults, "RUN", run)
     rows = list(gripper_faults.hostile(**NEAR))
