@@ -167,12 +167,13 @@ def injected(
                     yield result_of(fault.name, side, phase, name, at_s, grasp)
 
 
-def hostile() -> Iterator[FaultyGrasp]:
+def hostile(**body: Any) -> Iterator[FaultyGrasp]:
     """Grasp under each hostile controller, without a fault and with a stuck fingertip."""
+    stuck = FaultConfig(pad_fault="stuck", pad_side="left", pad_at_s=2.0)
     for name in HOSTILE:
-        yield result_of("none", "", "", name, inf, grasped(controller_named(name), FaultConfig()))
-        stuck = FaultConfig(pad_fault="stuck", pad_side="left", pad_at_s=2.0)
-        yield result_of("fingertip stuck", "left", "2 s", name, 2.0, grasped(controller_named(name), stuck))
+        law = controller_named(name)
+        yield result_of("none", "", "", name, inf, grasped(law, FaultConfig(), **body))
+        yield result_of("fingertip stuck", "left", "2 s", name, 2.0, grasped(law, stuck, **body))
 
 
 def table(rows: Iterable[FaultyGrasp]) -> list[str]:

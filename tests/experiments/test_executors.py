@@ -9,11 +9,15 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 import wayward
 from attrs import frozen
+
+from graspsense.core.values.errors import ConfigError
+from graspsense.experiments.executors import dask
 
 pytestmark = pytest.mark.slow
 
@@ -33,14 +37,7 @@ folds = 2
 controls = false
 grasps = 0
 """
-MAIN = "from graspsense.cli.main import main; main()"
-PROGRAM = (sys.executable, "-c", MAIN)
-HURRIED = (
-    sys.executable,
-    "-c",
-    f"from graspsense.experiments.executors import dask; dask.CONNECTING_S = 1.0; {MAIN}",
-)
-"""Where nobody will answer, one second of waiting for it is as good as ten."""
+PROGRAM = (sys.executable, "-c", "from graspsense.cli.main import main; main()")
 
 
 @frozen
@@ -51,23 +48,26 @@ class Lab:
     environ: dict[str, str]
 
     def write(self, *hows):
+        """Write an experiment with these cases, of which none has been told anything yet."""
+        for told in (self.folder / "plugin").glob("marks.*"):
+            told.unlink()
         variants = "\n".join(f'[[variants]]\nname = "{how}"\nclassifier.how = "{how}"' for how in hows)
         (self.folder / "trials.csv").write_text(wayward.CSV)
         (self.folder / "it.toml").write_text(EXPERIMENT.format(variants=variants))
 
-    def start(self, out, *arguments, program=PROGRAM, **environ):
+    def start(self, out, *arguments):
         return subprocess.Popen(
-            [*program, "experiment", "it.toml", "--out", out, "--json", *arguments],
+            [*PROGRAM, "experiment", "it.toml", "--out", out, "--json", *arguments],
             cwd=self.folder,
-            env={**self.environ, **environ},
+            env=self.environ,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
         )
 
-    def run(self, out, *arguments, ends=0, **environ):
+    def run(self, out, *arguments, ends=0):
         """Run the experiment, which ends with this code, and return what it says as JSON and on standard error."""
-        process = self.start(out, *arguments, **environ)
+        process = self.start(out, *arguments)
         stdout, stderr = process.communicate(timeout=300)
         assert process.returncode == ends, stderr
         return json.loads(stdout) if stdout else {}, stderr
@@ -90,8 +90,8 @@ class Lab:
         """Return how many tasks are being done and wait to be told to go on."""
         return len(list((self.folder / "plugin" / "marks").glob("waits-*")))
 
-    def go(self):
-        (self.folder / "plugin" / "marks.go").touch()
+    def tell(self, word):
+        (self.folder / "plugin" / f"marks.{word}").touch()
 
 
 @pytest.fixture
@@ -99,41 +99,6 @@ def lab(tmp_path):
     return Lab(tmp_path, wayward.install(tmp_path / "plugin"))
 
 
-@pytest.mark.parametrize("executor", ["processes", "dask"])
-def test_whatever_a_task_does_the_others_are_kept(lab, executor, request):
-    lab.write("fine", "kills", "kills once", "raises", "prints", "exits")
-    if executor == "dask":
-        _, address, worker = request.getfixturevalue("cluster")
-        worker(), worker()
-        executor = f"dask:{address}"
-    how = ("-o", "seeds=1", "--workers", "2", "--executor")
-    summary, _ = lab.run("out", *how, executor, ends=1)
-
-    assert summary["stopped"] is None
-    assert summary["missing"] == 0
-    done = {name: result is not None for name, result in lab.results("out").items()}
-    expected = {
-        "fine": True,
-        "kills once": True,
-        "prints": True,
-        "kills": False,
-        "raises": False,
-        "exits": False,
-    }
-    assert done == {f"{name}, seed 0": whether for name, whether in expected.items()}
-    reasons = {failure["task"]: failure["reason"] for failure in summary["failed"]}
-    assert "Unpicklable" in reasons["raises, seed 0"]
-    assert re.fullmatch(r"SystemExit: 3 in plugin/wayward\.py:[0-9]+", reasons["exits, seed 0"])
-    assert "its worker" in reasons["kills, seed 0"]
-
-    kept = lab.results("out")
-    (lab.folder / "plugin" / "marks.tamed").touch()
-    summary, _ = lab.run("out", *how, "processes", "--resume")
-    assert (summary["kept"], summary["done"], summary["complete"]) == (3, 3, True)
-    assert all(lab.results("out")[name] == result for name, result in kept.items() if result)
-
-
-@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="needs SIGKILL")
 @pytest.mark.parametrize("how", ["SIGKILL", "SIGINT", pytest.param("SIGTERM", marks=pytest.mark.long)])
 def test_a_run_that_is_ended_goes_on_where_it_was(lab, how):
     lab.write("fine", "waits")
@@ -142,7 +107,7 @@ def test_a_run_that_is_ended_goes_on_where_it_was(lab, how):
     process.send_signal(getattr(signal, how))
     process.wait(300)
     if how == "SIGKILL":
-        lab.go()  # a worker whose run is gone ends with its task
+        lab.tell("go")  # a worker whose run is gone ends with its task
     stdout, _ = process.communicate(timeout=300)
     if how != "SIGKILL":
         assert process.returncode == 130
@@ -150,8 +115,8 @@ def test_a_run_that_is_ended_goes_on_where_it_was(lab, how):
         assert summary["stopped"] == "interrupted"
         assert 1 <= summary["done"] < 4
     results = lab.results("out")
-    lab.go()
-    summary, _ = lab.run("out", "--executor", "processes", "--workers", "2", "--resume")
+    lab.tell("go")
+    summary, _ = lab.run("out", "--executor", "serial", "--resume")
     assert summary["kept"] == len(results) < 4
     assert summary["complete"]
     if how == "SIGKILL":
@@ -159,16 +124,17 @@ def test_a_run_that_is_ended_goes_on_where_it_was(lab, how):
         assert lab.results("out") == lab.results("undisturbed")
 
 
-@pytest.fixture
-def cluster(lab):
-    """Start a real scheduler and two workers, as processes of their own."""
+@contextmanager
+def scheduled(lab):
+    """Start a real scheduler as a process of its own; yield it, its address, and what starts a worker of it."""
     pytest.importorskip("distributed", reason="Dask is not installed")
     started = []
 
     def start(*arguments, **environ):
         process = subprocess.Popen(
             [sys.executable, "-m", "distributed.cli." + arguments[0], *arguments[1:]],
-            env={**lab.environ, **environ},
+            # A task that ended its worker comes back at once: trying it again is ours.
+            env={**lab.environ, "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "0", **environ},
             cwd=lab.folder,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
@@ -188,20 +154,59 @@ def cluster(lab):
             "dask_worker", address, "--nthreads", "1", "--no-dashboard", "--death-timeout", "60", **environ
         )
 
-    yield scheduler, address, worker
-    for process in started:
-        if process.poll() is None:
-            os.killpg(process.pid, signal.SIGKILL)
-        process.wait(300)
+    try:
+        yield scheduler, address, worker
+    finally:
+        for process in started:
+            if process.poll() is None:
+                os.killpg(process.pid, signal.SIGKILL)
+            process.wait(300)
 
 
-def test_a_cluster_of_two_workers_gives_what_one_process_gives(lab, cluster):
-    _, address, worker = cluster
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory):
+    """A folder with a plugin, and a scheduler with its address and two workers, which take seconds to start."""
+    folder = tmp_path_factory.mktemp("cluster")
+    lab = Lab(folder, wayward.install(folder / "plugin"))
+    with scheduled(lab) as (scheduler, address, worker):
+        worker(), worker()
+        yield lab, scheduler, address
+
+
+@pytest.mark.parametrize("executor", ["processes", "dask"])
+def test_whatever_a_task_does_the_others_are_kept(executor, request):
+    if executor == "processes":
+        lab = request.getfixturevalue("lab")
+    else:
+        lab, _, address = request.getfixturevalue("cluster")
+        executor = f"dask:{address}"
+    lab.write("fine", "kills", "kills once", "raises", "prints", "exits")
+    how = ("-o", "seeds=1", "--workers", "2", "--executor")
+    summary, _ = lab.run("out", *how, executor, ends=1)
+
+    assert summary["stopped"] is None
+    assert summary["missing"] == 0
+    results = lab.results("out")
+    kept = {name: result for name, result in results.items() if result is not None}
+    assert len(results) == 6
+    assert kept.keys() == {f"{case}, seed 0" for case in ("fine", "kills once", "prints")}
+    reasons = {failure["task"]: failure["reason"] for failure in summary["failed"]}
+    assert "Unpicklable" in reasons["raises, seed 0"]
+    assert re.fullmatch(r"SystemExit: 3 in plugin/wayward\.py:[0-9]+", reasons["exits, seed 0"])
+    assert "its worker" in reasons["kills, seed 0"]
+
+    lab.tell("tamed")
+    summary, _ = lab.run("out", *how, "serial", "--resume")
+    assert (summary["kept"], summary["done"], summary["complete"]) == (3, 3, True)
+    assert kept.items() <= lab.results("out").items()
+
+
+def test_a_cluster_of_two_workers_gives_what_one_process_gives(cluster):
+    lab, _, address = cluster
     lab.write("fine")
     (lab.folder / "it.toml").write_text(
         EXPERIMENT.format(variants="").replace('["wayward"]', '["c45"]').replace("seeds = 2", "seeds = 3")
     )
-    worker(), worker()
     lab.run("dask", "--executor", f"dask:{address}")
     lab.run("serial", "--executor", "serial")
 
@@ -209,12 +214,12 @@ def test_a_cluster_of_two_workers_gives_what_one_process_gives(lab, cluster):
     assert lab.results("dask") == lab.results("serial")
 
 
-def test_a_scheduler_that_is_stopped_ends_the_run_with_an_account(lab, cluster):
-    scheduler, address, worker = cluster
+def test_a_scheduler_that_is_stopped_ends_the_run_with_an_account(cluster):
+    """The last test with it."""
+    lab, scheduler, address = cluster
     lab.write("fine", "waits")
-    worker(), worker()
-    process = lab.start("out", "--executor", f"dask:{address}")
-    lab.until(lambda: len(lab.results("out")) >= 1 and lab.waiting() >= 1, process)
+    process = lab.start("stopped", "--executor", f"dask:{address}")
+    lab.until(lambda: len(lab.results("stopped")) >= 1 and lab.waiting() >= 1, process)
     os.killpg(scheduler.pid, signal.SIGKILL)
     stdout, stderr = process.communicate(timeout=300)
 
@@ -222,24 +227,23 @@ def test_a_scheduler_that_is_stopped_ends_the_run_with_an_account(lab, cluster):
     summary = json.loads(stdout)
     assert "scheduler" in summary["stopped"]
     assert summary["done"] >= 1
-    lab.go()
-    summary, _ = lab.run("out", "--executor", "serial", "--resume")
+    lab.tell("go")
+    summary, _ = lab.run("stopped", "--executor", "serial", "--resume")
     assert summary["kept"] >= 1
     assert summary["complete"]
 
 
-def test_workers_with_other_versions_are_refused(lab, cluster):
-    _, address, worker = cluster
+def test_workers_with_other_versions_are_refused(lab):
     lab.write("fine")
-    worker(PYTHONPATH="")
-    _, stderr = lab.run("out", "--executor", f"dask:{address}", ends=2)
+    with scheduled(lab) as (_, address, worker):
+        worker(PYTHONPATH="")
+        _, stderr = lab.run("out", "--executor", f"dask:{address}", ends=2)
 
     assert re.search(r"wayward: 0\.3\+[0-9a-f]{8} here, not installed", stderr)
 
 
-def test_no_scheduler_there(lab):
+def test_no_scheduler_there(monkeypatch):
     pytest.importorskip("distributed", reason="Dask is not installed")
-    lab.write("fine")
-    _, stderr = lab.run("out", "--executor", "dask:tcp://127.0.0.1:1", program=HURRIED, ends=2)
-
-    assert "tcp://127.0.0.1:1 within 1 s" in stderr
+    monkeypatch.setattr(dask, "CONNECTING_S", 0.5)
+    with pytest.raises(ConfigError, match=r"tcp://127\.0\.0\.1:1 within 0\.5 s"):
+        dask.DaskCluster("tcp://127.0.0.1:1")

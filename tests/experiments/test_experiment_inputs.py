@@ -364,9 +364,10 @@ def test_the_code_of_a_plugin_counts_with_what_it_imports_and_names(tmp_path, mo
         known.append(content())
     monkeypatch.setenv("lab_scale", "2")
     assert content() not in known
-    developed = input_content.developed_code("my_plugin.law")
-    (tmp_path / "src" / "my_plugin" / "law.py").write_text("a = 333")
-    assert input_content.developed_code("my_plugin.law") not in ("", developed)
+    for name in ("helper.py", "my_plugin/law.py"):
+        developed = input_content.developed_code("my_plugin.law")
+        (tmp_path / "src" / name).write_text("a = 333")
+        assert input_content.developed_code("my_plugin.law") not in ("", developed)
     assert input_content.developed_code("attrs.anything") == ""
 
 
@@ -458,6 +459,8 @@ def test_what_is_no_file_is_no_input():
         ('"features.type" = ["chitta", "curve"]', "features.type"),
         ('"run.hold_s" = [0.1, 0.2]', "run.hold_s"),
         ('"data.instances" = [2, 3]', "data.instances"),
+        ('"data.checkpoints_s" = [[0.1], [0.2]]', "data.checkpoints_s"),
+        ('"judge.folds" = [2, 3]\n[test]\nsource = "t.csv"\nlabel = "what"', "judge.folds"),
     ],
 )
 def test_a_sweep_without_effect_on_a_table_is_refused(tmp_path, sweep, key):

@@ -237,6 +237,7 @@ def test_one_run_at_a_time_writes_to_a_folder(file, tmp_path):
             "mine.toml.*: judge.folds: 10 folds of 7 trials",
         ),
         ('title = "x"\nkind = "juggle"', r"'juggle'. Known: "),
+        ('title = "x"\nkind = "early"\n[test]\ninstances = 3', r"mine.toml:3: test: .*'early'"),
         ('title = "x"\n[sweep]\n"controler.x" = [1]', r"mine.toml:3: sweep.controler.x: .*'controller'"),
         ('title = "x"\n[sweep]\n"run.seed" = 3', r"mine.toml:3: sweep.run.seed: "),
         ('title = "x"\n[sweep]\n"controller.probing_forse_n" = [1.0]', "'probing_force_n'"),

@@ -122,11 +122,9 @@ def summary_of(folder, kind, more):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("kind", "more"),
-    [("early", "moments_s = [0.0, 1.0]"), ("squeezes", "most = 2"), ("physics", "error = 0.1")],
-)
+@pytest.mark.parametrize(("kind", "more"), [("early", "moments_s = [0.0, 1.0]"), ("squeezes", "most = 2")])
 def test_each_trade_runs_and_gives_advice(tmp_path, kind, more):
+    """That of the physics is run whole by `test_a_trade_off_is_the_one_of_today`."""
     summary = summary_of(tmp_path, kind, more)
     findings = findings_of(summary)
     assert findings.answer

@@ -7,6 +7,7 @@ from attrs import evolve
 from commands import answered, refused
 
 from graspsense.evaluation.intervals import Difference
+from graspsense.experiments import simulation
 from graspsense.experiments.simulation import PEAK, TRACE, SimulationTrade, VariantPoint, simulation_table
 from graspsense.experiments.simulation_recognition import conclusion
 
@@ -60,6 +61,12 @@ def test_a_gripper_with_nothing_to_trade_is_refused(tmp_path):
     file.write_text("t,gap\n0,0\n")
     options = ["--gripper", "replay", "-o", f"gripper.recording=csv:{file}"]
     assert "no accuracy" in refused("tradeoff", "simulation", *options)
+
+
+@pytest.fixture(autouse=True)
+def _each_variant_is_timed_once(monkeypatch):
+    monkeypatch.setattr(simulation, "LEAST_S", 0.0)
+    monkeypatch.setattr(simulation, "LEAST_RUNS", 1)
 
 
 @pytest.mark.slow

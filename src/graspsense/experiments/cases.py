@@ -32,6 +32,7 @@ from graspsense.experiments.experiment import (
 )
 from graspsense.experiments.kinds import kind_of
 from graspsense.sources.identified import IDENTIFIED, identified_scenes
+from graspsense.sources.input_content import contents_of
 from graspsense.sources.simulated import number_of_trials as number_of_simulated_trials
 from graspsense.sources.simulated import simulated_objects
 from graspsense.sources.trial_source import (
@@ -39,10 +40,9 @@ from graspsense.sources.trial_source import (
     SIMULATED,
     TrialSource,
     groups_of,
-    keys_without_effect,
     labelled_trials,
     names_no_object,
-    tables_without_effect,
+    without_effect,
 )
 
 SWEPT_TABLES: Final = (*PIPELINE_TABLES, "classifier", "data", "test", "judge")
@@ -119,24 +119,24 @@ class CasePlan:
             sources = [source for source in (case.data, case.test) if source is not None]
             if self.complaints or not sources:
                 return
-            inert = set.intersection(
-                *(
-                    {*tables_without_effect(source), *(f"data.{key}" for key in keys_without_effect(source))}
-                    for source in sources
-                )
-            )
+            inert = set.intersection(*map(without_effect, sources))
+            if case.test is not None:
+                inert |= {f"judge.{key}" for key in getattr(case.judge, "of_folds", ())}
             named = " and ".join(source.source for source in sources)
             keys = [dotted(path) for path in sweep if {path[0], dotted(path[:2])} & inert]
             twin = seen.setdefault(_what_matters(case, inert), case)
             if not keys and twin is not case:
                 keys = [key for key in case.levels if case.levels[key] != twin.levels[key]]
             for key in keys:
-                why = (
-                    _SEEDS
-                    if key == "run.seed"
-                    else f"the trials of {named} do not depend on what differs. Vary a key of [classifier], [judge] or "
-                    f'[data] that they depend on, or simulate the trials (data.source = "{SIMULATED}")'
-                )
+                if key == "run.seed":
+                    why = _SEEDS
+                elif key.startswith("judge."):
+                    why = f"all trials of {named} are learned from or tested on, without folds and controls"
+                else:
+                    why = (
+                        f"the trials of {named} do not depend on what differs. Vary a key of [classifier], [judge] or "
+                        f'[data] that they depend on, or simulate the trials (data.source = "{SIMULATED}")'
+                    )
                 self.complaints.append(
                     f"{self.layer.where(('sweep', key))}: {key} makes no difference: {why}"
                 )
@@ -215,6 +215,10 @@ class CasePlan:
             simulated_objects(settings)
         kind = kind_of(experiment.kind)
         if data is not None and kind.declared.entry.simulates:
+            if test is not None:
+                self._complain(
+                    ("test",), f"experiments of the kind {experiment.kind!r} test on trials of [data] alone"
+                )
             try:
                 groups_of(data)
             except ConfigError as error:
@@ -334,20 +338,27 @@ def _what_matters(case: ExperimentCase, inert: set[str]) -> str:
     params = case.params
     params["settings"]["run"].pop("seed", None)  # a task has the seed of the experiment
     params["settings"] = {table: keys for table, keys in params["settings"].items() if table not in inert}
-    for name in ("data", "test"):
+    for name, table in (("data", "data"), ("test", "data"), ("judge", "judge")):
         keys = params[name] or {}
-        params[name] = {key: value for key, value in keys.items() if f"data.{key}" not in inert}
+        params[name] = {key: value for key, value in keys.items() if f"{table}.{key}" not in inert}
     return repr(params)
+
+
+_COUNTED: Final[dict[str, int]] = {}
+"""Numbers of trials by table and content: every case of an experiment asks for that of the same table."""
 
 
 def number_of_trials(settings: Settings, data: TrialSource) -> int | None:
     """Return the number of trials of a source, None for a data set, which would have to be read."""
     if data.kind == SIMULATED:
         return number_of_simulated_trials(settings, groups_of(data))
-    if data.kind == "CSV":
+    if data.kind != "CSV":
+        return None
+    table = repr((data, contents_of([data.source], code=False)))
+    if table not in _COUNTED:
         trials = labelled_trials(data, settings=lambda: settings, features=settings.features.create)
-        return len(without_copies(trials))
-    return None
+        _COUNTED[table] = len(without_copies(trials))
+    return _COUNTED[table]
 
 
 def in_a_name(key: str, value: Any) -> str:

@@ -6,6 +6,7 @@ judging are included. `benchmarks/experiment_times.py` measures them.
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 from attrs import frozen
@@ -50,13 +51,11 @@ class Effort:
 def effort_of(planned: Planned) -> Effort:
     """Return what an experiment consists of, with an estimate of the time."""
     entries = {name: resource.entry for name, resource in shipped().items()}
-    trials, seconds, trainings = 0, 0.0, 0
-    known = estimated = True
+    trials, seconds, trainings = 0.0, 0.0, 0
     for case in planned.cases:
         sources = [source for source in (case.data, case.test) if source is not None]
         counts = [number_of_trials(case.settings, source) for source in sources]
-        number = sum(count for count in counts if count is not None)
-        known = known and None not in counts
+        number = sum(math.nan if count is None else count for count in counts)
         trials += number
         targets, folds = len(getattr(case.judge, "targets", ())), getattr(case.judge, "folds", 1)
         trainings += len(case.learners) * targets * (folds if case.test is None else 1)
@@ -64,14 +63,13 @@ def effort_of(planned: Planned) -> Effort:
         share = None if entry is None else entry.seconds_per_trial
         if share is None:
             share = kind_of(case.kind).declared.entry.seconds_per_trial
-        estimated = estimated and share is not None
-        seconds += number * (share or 0.0)
+        seconds += number * (math.nan if share is None else share)
     seeds = len(planned.seeds)
     return Effort(
         cases=len(planned.cases),
         seeds=seeds,
-        trials=trials * seeds if known else None,
+        trials=None if math.isnan(trials) else int(trials) * seeds,
         simulated=any(case.data.source == "simulated" for case in planned.cases),
         trainings=trainings * seeds,
-        seconds=seconds * seeds if known and estimated else None,
+        seconds=None if math.isnan(seconds) else seconds * seeds,
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Final, Literal
+from typing import Any, ClassVar, Final, Literal
 
 from attrs import field, frozen
 from attrs.validators import ge, le, min_len
@@ -52,6 +52,8 @@ class EvaluationSettings:
     learning_curve: bool = False
     grasps: int = field(default=3, validator=[ge(0), le(MOST_KEPT_GRASPS)])
     """Simulated grasps of each label that are kept for the page, from the first seed."""
+    of_folds: ClassVar = ("folds", "protocol", "controls", "learning_curve")
+    """Keys without an effect where other trials are tested on."""
 
 
 def recognise(params: Mapping[str, Any], seed: int) -> RecognitionResult:

@@ -91,17 +91,14 @@ class Results:
 
     def begin(self, planned: Planned, command: str) -> None:
         """Write the experiment, its pipelines and its provenance next to the results. Raises SaveFailed."""
-        # Without the settings that follow another one, since a sweep may change that.
-        texts = {
-            file_of(name): to_toml(evolve(pipeline, values=without_followers(pipeline.values)))
-            for name, pipeline in planned.pipelines.items()
-        }
-        for name, text in texts.items():
-            _write(self.folder / PIPELINES / name, text)
+        folders = (PIPELINES, f"{PARTS}/{PIPELINES}") if planned.parts else (PIPELINES,)
+        for name, pipeline in planned.pipelines.items():
+            # Without the settings that follow another one, since a sweep may change that.
+            text = to_toml(evolve(pipeline, values=without_followers(pipeline.values)))
+            for folder in folders:
+                _write(self.folder / folder / file_of(name), text)
         _write(self.folder / EXPERIMENT, resolved(planned))
         for part in planned.parts:
-            for name, text in texts.items():
-                _write(self.folder / PARTS / PIPELINES / name, text)
             _write(self.folder / PARTS / file_of(part.name), resolved(part))
         provenance = {
             "experiment": planned.name,

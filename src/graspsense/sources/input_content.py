@@ -81,8 +81,6 @@ def _texts(value: Any) -> Iterator[str]:
 
 def _content(text: str, codes: Mapping[str, list[tuple[str, str]]]) -> str | None:
     """Return the hash of what a text names; None if it names no input. `codes` are those of `_codes`."""
-    if "\n" in text:
-        return None  # the text of a scene, which is its own content
     if text in codes:
         return _hash(_hash_of_code(*code) for code in codes[text])
     if text.startswith(STORE):
@@ -164,7 +162,7 @@ def _hash_of_code(version: str, module: str) -> str:
     if package == FRAMEWORK:
         return version
     code = _code_of(package)
-    texts = set[str]().union(*code.values())
+    texts = set[str]().union(*(_texts_in(file) for files in code.values() for file in files))
     variables = {text: os.environ[text] for text in texts & os.environ.keys() if len(text) > 1}
     texts.update(variables.values())
     developed = [place for place in code if _is_developed(place)]
@@ -176,19 +174,19 @@ def _hash_of_code(version: str, module: str) -> str:
     return _hash([version, *map(_hash_of_tree, (*code, *named)), *values])
 
 
-def _code_of(package: str) -> dict[str, set[str]]:
-    """Return the places of a package, and of the developed ones that its code imports, each with the texts in its code.
+def _code_of(package: str) -> dict[str, list[str]]:
+    """Return the places of a package, and of the developed ones that its code imports, each with its files of code.
 
     The version of graspsense counts for its code, but for its own plugins.
     """
-    code: dict[str, set[str]] = {}
+    code: dict[str, list[str]] = {}
     left, known = [package], {package, *sys.stdlib_module_names}
     while left:
         name = left.pop()
         for place in _places_of_package(name):
             files = glob(f"{escape(place)}/**/*.py", recursive=True) if os.path.isdir(place) else [place]
-            code[place] = set[str]().union(*map(_texts_in, files)) if name != FRAMEWORK else set()
-            imported = set[str]().union(*map(_imported_in, files)) if name != FRAMEWORK else set()
+            code[place] = files if name != FRAMEWORK else []
+            imported = set[str]().union(*map(_imported_in, code[place]))
             for further in sorted(imported - known):
                 known.add(further)
                 places = _places_of_package(further)
@@ -222,11 +220,11 @@ def required_by(distribution: str) -> set[str]:
 
 
 def developed_code(module: str) -> str:
-    """Return a hash of the package of a module that is not installed but developed; empty for an installed one.
+    """Return a hash of the package of a module, and of what it imports, where they are developed; empty if installed.
 
     The version of a developed package says nothing of its content.
     """
-    places = _places_of_package(module.partition(".")[0])
+    places = _code_of(module.partition(".")[0])
     return _hash(map(_hash_of_tree, places)) if all(map(_is_developed, places)) else ""
 
 

@@ -74,16 +74,13 @@ KEYS_OF_KIND: Final[Mapping[Kind, tuple[str, ...]]] = {
 """The keys of a source that are for one kind of it."""
 
 
-def tables_without_effect(source: TrialSource) -> tuple[str, ...]:
-    """Return the tables of a pipeline that the trials of this source do not depend on."""
-    return {"simulated": (), "CSV": ("gripper", "controller", "features", "run")}.get(
+def without_effect(source: TrialSource) -> set[str]:
+    """Return the tables of a pipeline, and the keys of a source as `data.KEY`, that its trials do not depend on."""
+    inert = {"simulated": (), "CSV": ("gripper", "controller", "features", "run", "data.checkpoints_s")}.get(
         source.kind, ("gripper", "controller", "run")
     )
-
-
-def keys_without_effect(source: TrialSource) -> tuple[str, ...]:
-    """Return the keys of a source that its trials do not depend on, because they are for another kind."""
-    return tuple(key for kind, keys in KEYS_OF_KIND.items() if kind != source.kind for key in keys)
+    others = (key for kind, keys in KEYS_OF_KIND.items() if kind != source.kind for key in keys)
+    return {*inert, *(f"data.{key}" for key in others)}
 
 
 NO_OBJECT: Final = "an empty list names no object: leave it out for the default ones, or name some"

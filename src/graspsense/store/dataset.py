@@ -128,7 +128,8 @@ def labelled_store(
             tables = _stored_tables(store, folder, rows, feature_set)
         known_controls = _controls(store, rows, tables)
         content, unused = _contents(store, rows), _unused(store)
-    order, no_order = order_recorded(rows.made_at, rows.origin, rows.labels)
+    labels = [decoded(folder, text) for text in rows.labels]
+    order, no_order = order_recorded(rows.made_at, rows.origin, labels)
     return Labelled(
         source=f"store:{folder}",
         table=tables.features,

@@ -7,7 +7,7 @@ released, a statement never changes: a change is a new version.
 from __future__ import annotations
 
 import sqlite3
-from contextlib import suppress
+from contextlib import closing, suppress
 from functools import cache
 from typing import Final
 
@@ -105,14 +105,11 @@ def migrate(connection: sqlite3.Connection, version: int) -> None:
 @cache
 def tables_of_version(version: int) -> frozenset[tuple[str, str, str]]:
     """Return type, name and SQL of every table and index in a store of this version."""
-    connection = sqlite3.connect(":memory:")
-    try:
+    with closing(sqlite3.connect(":memory:")) as connection:
         for statements in VERSIONS[:version]:
             for statement in statements:
                 connection.execute(statement)
         return tables_in(connection)
-    finally:
-        connection.close()
 
 
 def tables_in(connection: sqlite3.Connection) -> frozenset[tuple[str, str, str]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Final
@@ -19,22 +18,21 @@ ORDER: Final = "order"
 
 
 def order_recorded(
-    made_at: Sequence[str], origins: Sequence[str], labels: Sequence[str]
+    made_at: Sequence[str], origins: Sequence[str], labels: Sequence[Mapping[str, str]]
 ) -> tuple[tuple[int, ...] | None, str]:
     """Return the position of each trial in the order of recording, or None with the reason.
 
-    `labels` are the labels of the recordings as JSON. A trial that was grasped by graspsense was recorded when it was
+    `labels` are the labels of the recordings. A trial that was grasped by graspsense was recorded when it was
     made. An imported one says so in its labels, by `recorded_at`, or all of them by `order`.
     """
-    stated = [_labels(text) for text in labels]
-    if set(origins) == {"import"} and all(ORDER in label and RECORDED_AT not in label for label in stated):
-        numbers = [number_in(str(label[ORDER])) for label in stated]
+    if set(origins) == {"import"} and all(ORDER in label and RECORDED_AT not in label for label in labels):
+        numbers = [number_in(str(label[ORDER])) for label in labels]
         known = [number for number in numbers if number is not None]
         if len(known) == len(numbers):
             return _positions(known), ""
     times = [
         _time(label.get(RECORDED_AT, "")) if origin == "import" else _time(made)
-        for made, origin, label in zip(made_at, origins, stated, strict=True)
+        for made, origin, label in zip(made_at, origins, labels, strict=True)
     ]
     known_times = [time for time in times if time is not None]
     if len(known_times) < len(times):
@@ -49,14 +47,6 @@ def order_recorded(
 def _positions(values: Sequence[float]) -> tuple[int, ...]:
     """Return the rank of each value; equal ones keep their order."""
     return tuple(np.argsort(np.argsort(values, kind="stable")).tolist())
-
-
-def _labels(text: str) -> Mapping[str, str]:
-    try:
-        value = json.loads(text)
-    except ValueError:
-        return {}
-    return value if isinstance(value, dict) else {}
 
 
 def _time(text: str) -> float | None:

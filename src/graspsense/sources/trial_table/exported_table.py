@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -55,8 +54,8 @@ class ExportedTable:
         """Return the position of each trial in the order of recording, or None with the reason."""
         cells = self.columns.cells
         keys = [key for key in ("recorded_at", "order") if key in self.about]
-        labels = [
-            json.dumps({key: cells[key][i] for key in keys if not is_missing_label(cells[key][i])})
+        labels: list[dict[str, str]] = [
+            {key: cells[key][i] for key in keys if not is_missing_label(cells[key][i])}
             for i in range(len(self.columns))
         ]
         return order_recorded(cells["made_at"], cells["origin"], labels)
