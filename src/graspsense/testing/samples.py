@@ -111,15 +111,19 @@ def with_signals(trace: Trace, channels: Iterable[Channel]) -> Trace:
     return evolve(trace, signals=signals)
 
 
-def shifted(trace: Trace, seconds: float) -> Trace:
-    """Return the trace with all times shifted."""
+def by_another_clock(trace: Trace, seconds: float = 0.0, slower: float = 1.0) -> Trace:
+    """Return the trace with all times shifted, or as many times as long."""
     signals = {
-        name: signal if isinstance(signal, np.ndarray) else evolve(signal, t_s=signal.t_s + seconds)
+        name: signal if isinstance(signal, np.ndarray) else evolve(signal, t_s=slower * signal.t_s + seconds)
         for name, signal in trace.signals.items()
     }
-    events = tuple(evolve(event, t_s=event.t_s + seconds) for event in trace.events)
     return evolve(
-        trace, t_s=trace.t_s + seconds, pad_t_s=trace.pad_t_s + seconds, signals=signals, events=events
+        trace,
+        t_s=slower * trace.t_s + seconds,
+        velocity_m_s=trace.velocity_m_s / slower,
+        pad_t_s=slower * trace.pad_t_s + seconds,
+        signals=signals,
+        events=tuple(evolve(event, t_s=slower * event.t_s + seconds) for event in trace.events),
     )
 
 

@@ -114,7 +114,8 @@ def readings_of(subject: Any) -> Session:
     except GraspsenseError as error:
         raise CheckFailed(
             f"it cannot be used as it is set: {error}\n    give it the settings to be checked with (-o KEY=VALUE, or "
-            "`keys` in a test)"
+            "`keys` in a test)",
+            str(error),
         ) from error
     finally:
         began = time.perf_counter()

@@ -37,6 +37,7 @@ from graspsense.core.values.errors import (
     ComponentFailed,
     ConfigError,
     PluginUnavailable,
+    named,
     suggestion,
 )
 
@@ -117,7 +118,8 @@ class Declared(ABC, Generic[EntryT]):
             if hasattr(module, name):
                 return getattr(module, name)
         except FAILURES as error:  # the import of a third party's module can raise anything
-            raise self._unavailable(f"{type(error).__name__}: {error}") from error
+            lacks = "; `pip check` says what is not installed" * isinstance(error, ModuleNotFoundError)
+            raise self._unavailable(f"{named(error)}{lacks}") from error
         near = suggestion(name, dir(module))
         raise self._unavailable(f"{path} has no {name!r}" + (near and f".{near}"))
 
@@ -344,7 +346,7 @@ class Resource(Declared[EntryT]):
         try:
             file = files(package).joinpath(path)
         except FAILURES as error:
-            raise self._unavailable(f"{type(error).__name__}: {error}") from error
+            raise self._unavailable(named(error)) from error
         if not file.is_file():
             raise self._unavailable(f"there is no file {path!r} in the package {package!r}")
         return file
