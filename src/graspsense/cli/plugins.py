@@ -314,15 +314,11 @@ def _advice(status: PluginStatus) -> tuple[str, ...]:
 
 def _clash(component: Component, loaded: Plugins) -> tuple[str, ...]:
     """Return what is to be done where others use the name of this component."""
-    others = [
-        other.qualified
-        for other in loaded.components(component.role)
-        if other.name == component.name and other.distribution != component.distribution
-    ]
+    others = loaded.namesakes(component)
     if not others:
         return ()
     return (
-        f"the {component.role.replace('-', ' ')} name {component.name!r} is also that of {', '.join(others)}: write "
+        f"the {component.kind} name {component.name!r} is also that of {', '.join(others)}: write "
         f'{component.table}.type = "{component.qualified}", or disable one of them',
     )
 

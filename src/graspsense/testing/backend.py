@@ -37,7 +37,7 @@ from graspsense.testing.checks import (
     raises_nothing,
 )
 from graspsense.testing.laws import EFFORT_N, FORCE_N, REST_S, GentleController, kind_of
-from graspsense.testing.session import TIMEOUT_S, Session, description, next_reading, opened, readings_of, use
+from graspsense.testing.session import TIMEOUT_S, description, next_reading, opened, readings_of, use
 from graspsense.testing.subject import Subject
 
 GRACE_S: Final = 1.0
@@ -103,13 +103,12 @@ def pads_can_be_zeroed(subject: Subject) -> None:
     info, declared = subject.session.info, {channel.name for channel in subject.entry.channels}
     if not info.tare_images or not declared & {"force_left", "force_right"}:
         raise CheckSkipped("this gripper is not tared")
-    with opened(subject) as (backend, info):
+    with opened(subject) as (backend, session):
         with (
             raises_nothing("a tare without images", ": raise TareRefused with what to do"),
             suppress(TareRefused),
         ):
             backend.tare([])
-        session = Session(info, opened_s=0.0)
         for _ in range(ceil(5.0 * info.rate_hz / TARE_TICKS)):
             if len(session.images) < info.tare_images:
                 use(session, backend, "unloaded", TARE_TICKS, info.relaxed)
@@ -170,10 +169,10 @@ def same_seed_same_frames(subject: Subject) -> None:
     texts = []
     for _ in range(2):
         readings: list[str] = []
-        with opened(subject, seed=3) as (backend, info), suppress(RecordingEnded):
+        with opened(subject, seed=3) as (backend, session), suppress(RecordingEnded):
             for _ in range(100):
                 readings.append(repr(backend.read(TIMEOUT_S)))
-                backend.apply(info.opening or info.relaxed)
+                backend.apply(session.info.opening or session.info.relaxed)
         texts.append(readings)
     demand(
         texts[0] == texts[1],
@@ -277,8 +276,8 @@ def squeezes_with_what_it_is_asked(subject: Subject) -> None:
         )
         demand(
             most_n >= -1.0,
-            f"its {name} is {most_n:.3g} when it squeezes: the force on a pad that is pressed is positive, and an effort "
-            "that closes the fingers",
+            f"its {name} is {most_n:.3g} when it squeezes: the force on a pad that is pressed is positive, and so is "
+            "an effort that closes the fingers",
         )
         demand(
             most_n <= MARGIN * asked_n + grasp.device.friction_n + 1.0,
@@ -332,8 +331,8 @@ def reports_a_lost_device(subject: Subject) -> None:
         raise CheckNotTried(
             "no settings were given under which it vanishes (--unplugged, or `unplugged` in a test)"
         )
-    with opened(subject, **subject.unplugged) as (backend, info):
-        text = _lost(backend, info.relaxed, info.rate_hz)
+    with opened(subject, **subject.unplugged) as (backend, session):
+        text = _lost(backend, session.info.relaxed, session.info.rate_hz)
     demand(len(text) > 10, f"DeviceLost says {text!r}: say which gripper, and what to look at")
     grasp = run_uninterrupted(
         subject.create(**subject.unplugged), GentleController(kind_of(subject.entry.accepts)), RunConfig()

@@ -312,7 +312,9 @@ def few_trials_are_refused_or_learned(subject: Subject) -> None:
         "two trials of each label": [0, 1, 2, 3, 4, 5],
     }
     cases = [(what, table.rows(np.array(rows)), [labels[i] for i in rows]) for what, rows in few.items()]
-    for i in range(0, len(labels), 15):  # a model that leaves trials out, anywhere, lacks the label of one of these
+    for i in range(
+        0, len(labels), 15
+    ):  # a model that leaves trials out, anywhere, lacks the label of one of these
         cases.append(("one trial of a label", table, [*labels[:i], "rare", *labels[i + 1 :]]))
     for what, trials, given in cases:
         classifier = _fitted_or_refused(subject, what, trials, given)

@@ -17,7 +17,7 @@ from graspsense.core.values.signals import (
 )
 from graspsense.testing.checks import CheckSkipped, demand, raises_nothing
 from graspsense.testing.laws import kind_of
-from graspsense.testing.session import CLOSING_S, OPENING_S, Session, limits_of, opened, ticks_in, use
+from graspsense.testing.session import CLOSING_S, OPENING_S, limits_of, opened, ticks_in, use
 from graspsense.testing.subject import Subject
 
 MOVED_M: Final = 1e-3
@@ -84,12 +84,11 @@ def _gaps_of(readings: Iterable[Reading]) -> list[float]:
 
 def _closing_gaps(subject: Subject, kind: int) -> list[float]:
     """Return the gaps under a gentle closing command of this kind, until the fingers have moved."""
-    with opened(subject) as (backend, info):
-        session = Session(info, opened_s=0.0)
-        use(session, backend, "opening", ticks_in(info, OPENING_S), info.opening)
+    with opened(subject) as (backend, session):
+        use(session, backend, "opening", ticks_in(session.info, OPENING_S), session.info.opening)
         gaps: list[float] = []
         for _ in range(5):
-            use(session, backend, "closing", ticks_in(info, CLOSING_S / 5), kind)
+            use(session, backend, "closing", ticks_in(session.info, CLOSING_S / 5), kind)
             gaps = _gaps_of(session.stages["closing"])
             if gaps and gaps[0] - gaps[-1] > MOVED_M:
                 break
@@ -109,8 +108,7 @@ def stays_within_its_limits(subject: Subject) -> None:
 
 def _beyond_limits(subject: Subject, kind: int) -> str:
     """Return in words what exceeds its limit under the largest commands of this kind; empty if nothing does."""
-    with opened(subject) as (backend, info):
-        session = Session(info, opened_s=0.0)
+    with opened(subject) as (backend, session):
         usual = limits_of(session.info)
         # The limits of a first use apply after a contact too.
         limits = usual._replace(effort_limit_n=usual.first_effort_n, speed_limit_m_s=usual.first_speed_m_s)
@@ -150,11 +148,10 @@ def says_what_commands_become(subject: Subject) -> None:
 def accepts_every_declared_kind(subject: Subject) -> None:
     """Each kind in `accepts` can be applied, and frames continue to come."""
     demand(bool(subject.entry.accepts), "`accepts` is empty: a gripper takes at least one kind of command")
-    with opened(subject) as (backend, info):
-        session = Session(info, opened_s=0.0)
+    with opened(subject) as (backend, session):
         for name in subject.entry.accepts:
             advice = f" on a {name} command, which `accepts` says it takes: take it, or take {name!r} out of `accepts`"
             with raises_nothing("apply", advice):
                 use(session, backend, name, 10, KINDS.index(name))
             demand(bool(session.stages[name]), f"after a {name} command no frame came")
-        backend.apply(info.relaxed)
+        backend.apply(session.info.relaxed)

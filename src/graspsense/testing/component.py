@@ -41,16 +41,6 @@ def classes_can_be_imported(subject: Subject) -> None:
         raise
 
 
-def declared_once(subject: Subject) -> None:
-    """The entry does not repeat what the class declares."""
-    twice = subject.component.declared_twice()
-    demand(
-        not twice,
-        f"{', '.join(twice)} stand both in the entry and in {subject.component.entry.target}, and only the entry "
-        "counts: leave them out of the entry",
-    )
-
-
 def config_name(subject: Subject) -> str:
     """Return the import string of its config class."""
     cls = subject.component.config_class()

@@ -254,11 +254,6 @@ def types_do_not_change(subject: Subject) -> None:
                 )
 
 
-def commands_are_numbers(subject: Subject) -> None:
-    """Every command is a Command with an integer kind and three floats."""
-    ticks_of(subject)
-
-
 def commands_are_of_declared_kinds(subject: Subject) -> None:
     """Every command is of a kind that `commands` lists."""
     for object_name in OBJECTS:

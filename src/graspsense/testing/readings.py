@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from graspsense.core.components.channels import declared_dtype, dtype_of, further, no_signals
-from graspsense.core.components.delivered import Delivered
+from graspsense.core.components.delivered import Delivered, numbers_of
 from graspsense.core.values.channel import FLOATS, Channel, FastChannel, TactileArray
 from graspsense.core.values.fingers import fingers_of, opposed_forces
 from graspsense.core.values.signals import (
@@ -110,14 +110,9 @@ def signals_are_those_declared(subject: Subject) -> None:
         if isinstance(channel, TactileArray) and channel.dtype != FLOATS:
             _demand_images(channel.name, [value.cells for value in values if value.counter])
             continue
-        if isinstance(channel, TactileArray) and channel.components > 1:
-            numbers = [number for value in values if value.counter for cell in value.cells for number in cell]
-        elif isinstance(channel, TactileArray):
-            numbers = [cell for value in values if value.counter for cell in value.cells]
-        elif isinstance(channel, FastChannel):
-            numbers = [number for value in values for row in value.values[: value.new] for number in row]
-        else:
-            numbers = values
+        numbers = [
+            number for value in values if getattr(value, "counter", True) for number in numbers_of(value)
+        ]
         wrong = next((number for number in numbers if type(number) is not float or isinf(number)), None)
         demand(wrong is None, f"{channel.name!r} has the value {wrong!r}: give finite floats, or NaN")
         demand(

@@ -35,7 +35,7 @@ class Session:
     """The readings by stage: `opening`, `closing`, `open again`; or `recording` for a recording."""
 
     info: DeviceInfo
-    opened_s: float
+    opened_s: float = 0.0
     """The time (s) that `open` took."""
     stages: dict[str, list[Reading]] = field(factory=dict)
     sums: list[tuple[int, ...]] = field(factory=list)
@@ -86,11 +86,11 @@ def next_reading(backend: SensorBackend[Any]) -> Reading | None:
 
 
 @contextmanager
-def opened(subject: Any, seed: int = 0, **keys: Any) -> Iterator[tuple[Any, DeviceInfo]]:
-    """Open the gripper under check within this context, with these settings as well."""
+def opened(subject: Any, seed: int = 0, **keys: Any) -> Iterator[tuple[Any, Session]]:
+    """Open the gripper under check within this context, with these settings as well, for a session without readings."""
     backend = subject.create(**keys)
     try:
-        yield backend, description(backend.open(seed))
+        yield backend, Session(description(backend.open(seed)))
     finally:
         backend.close()
 

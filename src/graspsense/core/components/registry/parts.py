@@ -211,13 +211,6 @@ class Component(Declared[ComponentEntry]):
         """Return whether its channels depend on its settings. Raises PluginUnavailable."""
         return "channels" in self._left_out() and self._varies("channels")
 
-    def declared_twice(self) -> tuple[str, ...]:
-        """Return what both its entry and its class declare. Raises PluginUnavailable."""
-        left_out = self._left_out()
-        return tuple(
-            name for name in ROLES[self.role].declared if name not in left_out and self._of_class(name)
-        )
-
     def _left_out(self) -> tuple[str, ...]:
         """Return what its entry leaves to the class; one that declares its commands leaves no alternatives to them."""
         names = ROLES[self.role].declared

@@ -52,6 +52,7 @@ from graspsense.core.components.registry.isolation import (
 from graspsense.core.components.registry.parts import (
     AnswerT,
     Component,
+    Declared,
     EntryT,
     HookAnswer,
     PluginStatus,
@@ -110,6 +111,11 @@ class Plugins:
         order = list(ROLES)
         of_role = (part for part in self._parts if isinstance(part, Component) and role in (None, part.role))
         return tuple(sorted(of_role, key=lambda part: (order.index(part.role), part.name, part.distribution)))
+
+    def namesakes(self, part: Declared[Any]) -> tuple[str, ...]:
+        """Return the qualified names of the parts of other distributions with the kind and name of this one."""
+        same = (other for other in self._parts if (other.kind, other.name) == (part.kind, part.name))
+        return tuple(other.qualified for other in same if other.distribution != part.distribution)
 
     def feature_sets(self) -> tuple[FeatureSetEntry, ...]:
         """Return what each feature set declares; one whose class cannot be imported is left out."""
