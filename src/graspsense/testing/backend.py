@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import time
 from contextlib import closing, nullcontext, suppress
+from functools import lru_cache
 from math import ceil, isfinite, isnan, nan
 from pathlib import Path
 from statistics import fmean, median
@@ -239,13 +240,11 @@ def objects_can_be_grasped(subject: Subject) -> None:
         )
 
 
+@lru_cache(maxsize=1)
 def _gentle_grasp(subject: Subject) -> Grasp:
     """Return a gentle grasp; performed once."""
-    if "gentle grasp" not in subject.kept:
-        controller = GentleController(kind_of(subject.entry.accepts))
-        subject.kept["gentle grasp"] = run_uninterrupted(subject.create(), controller, RunConfig(hold_s=0.05))
-    grasp: Grasp = subject.kept["gentle grasp"]
-    return grasp
+    controller = GentleController(kind_of(subject.entry.accepts))
+    return run_uninterrupted(subject.create(), controller, RunConfig(hold_s=0.05))
 
 
 def squeezes_with_what_it_is_asked(subject: Subject) -> None:

@@ -96,7 +96,8 @@ def _closing_gaps(subject: Subject, kind: int) -> list[float]:
 
 
 def stays_within_its_limits(subject: Subject) -> None:
-    """Under the largest commands of each kind, the reported effort and speed stay within their limits."""
+    """Under the largest commands of each kind in `accepts`, frames come, with an effort and a speed within limits."""
+    demand(bool(subject.entry.accepts), "`accepts` is empty: a gripper takes at least one kind of command")
     if subject.session.info.opening is None:
         raise CheckSkipped("a recording cannot be commanded")
     for name in subject.entry.accepts:
@@ -114,7 +115,10 @@ def _beyond_limits(subject: Subject, kind: int) -> str:
         limits = usual._replace(effort_limit_n=usual.first_effort_n, speed_limit_m_s=usual.first_speed_m_s)
         greatest = {VELOCITY: -1e6, POSITION: 0.0, FORCE: 1e6, EFFORT: 1e6}[kind]
         ticks = max(int(0.5 * session.info.rate_hz), 20)
-        use(session, backend, "closing hard", ticks, Command(kind, greatest, inf, inf), limits)
+        advice = f" on a {KINDS[kind]} command, which `accepts` says it takes: take it, or take it out of `accepts`"
+        with raises_nothing("apply", advice):
+            use(session, backend, "closing hard", ticks, Command(kind, greatest, inf, inf), limits)
+    demand(len(session.frames) > 1, f"after a {KINDS[kind]} command no frame came")
     for name, limit, least, grace in (
         ("effort_n", usual.first_effort_n, backend.least_force_n, 1.1),
         ("velocity_m_s", usual.first_speed_m_s, backend.least_speed_m_s, 3.0),
@@ -143,15 +147,3 @@ def says_what_commands_become(subject: Subject) -> None:
         not lacking,
         f"`closes_itself` does not say what a command of {', '.join(lacking)} becomes: write it in a few words",
     )
-
-
-def accepts_every_declared_kind(subject: Subject) -> None:
-    """Each kind in `accepts` can be applied, and frames continue to come."""
-    demand(bool(subject.entry.accepts), "`accepts` is empty: a gripper takes at least one kind of command")
-    with opened(subject) as (backend, session):
-        for name in subject.entry.accepts:
-            advice = f" on a {name} command, which `accepts` says it takes: take it, or take {name!r} out of `accepts`"
-            with raises_nothing("apply", advice):
-                use(session, backend, name, 10, KINDS.index(name))
-            demand(bool(session.stages[name]), f"after a {name} command no frame came")
-        backend.apply(session.info.relaxed)

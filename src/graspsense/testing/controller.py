@@ -6,7 +6,7 @@ import inspect
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from functools import cache
+from functools import cache, lru_cache
 from math import inf, isfinite
 from typing import Any, Final, NamedTuple, get_type_hints
 
@@ -76,12 +76,10 @@ class Tick(NamedTuple):
         return self.reading.frame
 
 
+@lru_cache(maxsize=4)
 def ticks_of(subject: Subject, object_name: str = "a soft object") -> list[Tick]:
     """Return the ticks of this law on the model_gripper, until it ends the grasp or for four seconds; computed once."""
-    kept: dict[str, list[Tick]] = subject.kept.setdefault("ticks", {})
-    if object_name not in kept:
-        kept[object_name] = fresh_ticks(subject, object_name)
-    return kept[object_name]
+    return fresh_ticks(subject, object_name)
 
 
 def fresh_ticks(
