@@ -289,19 +289,6 @@ def _fitted_or_refused(subject: Subject, what: str, table: FeatureTable, labels:
     return classifier
 
 
-def one_label_is_refused_or_certain(subject: Subject) -> None:
-    """With one training label, `fit` raises ValueError, or that label has probability 1."""
-    table, labels = sample_table()
-    classifier = _fitted_or_refused(subject, "one label", table, ["can:full"] * len(labels))
-    if classifier is None:
-        return
-    given = classifier.probabilities(table)
-    demand(
-        classifier.classes() == ("can:full",) and bool((given == 1.0).all()),
-        f"trained on one label it gives {classifier.classes()} with {given[0]}",
-    )
-
-
 def few_trials_are_refused_or_learned(subject: Subject) -> None:
     """With few training trials, of all labels or one, `fit` raises ValueError, or the model knows every label."""
     table, labels = sample_table()
@@ -316,11 +303,16 @@ def few_trials_are_refused_or_learned(subject: Subject) -> None:
         0, len(labels), 15
     ):  # a model that leaves trials out, anywhere, lacks the label of one of these
         cases.append(("one trial of a label", table, [*labels[:i], "rare", *labels[i + 1 :]]))
+    cases.append(("one label", table, ["can:full"] * len(labels)))
     for what, trials, given in cases:
         classifier = _fitted_or_refused(subject, what, trials, given)
         if classifier is None:
             continue
-        _shares(classifier, table, f"trained on {what}, ", "raise ValueError in fit, or answer")
+        shares = _shares(classifier, table, f"trained on {what}, ", "raise ValueError in fit, or answer")
+        demand(
+            what != "one label" or bool((shares == 1.0).all()),
+            f"trained on one label it gives it the probability {shares.min():g}: refuse it, or give 1",
+        )
         _demand_classes(classifier.classes(), given, "raise ValueError in fit, or learn from every trial")
 
 

@@ -17,7 +17,7 @@ from graspsense.core.values.signals import (
 )
 from graspsense.testing.checks import CheckSkipped, demand, raises_nothing
 from graspsense.testing.laws import kind_of
-from graspsense.testing.session import CLOSING_S, OPENING_S, limits_of, opened, ticks_in, use
+from graspsense.testing.session import limits_of, opened, readings_of, use
 from graspsense.testing.subject import Subject
 
 MOVED_M: Final = 1e-3
@@ -61,7 +61,7 @@ def closing_closes(subject: Subject) -> None:
     for name in subject.entry.accepts:
         kind = KINDS.index(name)
         usual = kind == kind_of(subject.entry.accepts)
-        gaps = _gaps_of(stages["closing"]) if usual else _closing_gaps(subject, kind)
+        gaps = _gaps_of((stages if usual else readings_of(subject, kind).stages)["closing"])
         if all(map(isnan, gaps)):
             raise CheckSkipped("this gripper has no gap")
         demand(
@@ -80,19 +80,6 @@ def closing_closes(subject: Subject) -> None:
 
 def _gaps_of(readings: Iterable[Reading]) -> list[float]:
     return [reading.frame.gap_m for reading in readings]
-
-
-def _closing_gaps(subject: Subject, kind: int) -> list[float]:
-    """Return the gaps under a gentle closing command of this kind, until the fingers have moved."""
-    with opened(subject) as (backend, session):
-        use(session, backend, "opening", ticks_in(session.info, OPENING_S), session.info.opening)
-        gaps: list[float] = []
-        for _ in range(5):
-            use(session, backend, "closing", ticks_in(session.info, CLOSING_S / 5), kind)
-            gaps = _gaps_of(session.stages["closing"])
-            if gaps and gaps[0] - gaps[-1] > MOVED_M:
-                break
-        return gaps
 
 
 def stays_within_its_limits(subject: Subject) -> None:

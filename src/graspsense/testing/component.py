@@ -47,21 +47,13 @@ def config_name(subject: Subject) -> str:
     return f"{cls.__module__}:{cls.__qualname__}"
 
 
-def settings_have_types(subject: Subject) -> None:
-    """Every key of the config class has a type, so that values from files can be checked."""
-    cls: Any = subject.component.config_class()
-    bare = [field.alias for field in attrs.fields(cls) if field.init and field.type is None]
-    demand(
-        not bare,
-        f"{config_name(subject)} has keys without a type: {', '.join(bare)}. Annotate them, as in "
-        f"`{(bare or ['key'])[0]}: float = 1.0`",
-    )
-
-
 def settings_declare_their_meaning(subject: Subject) -> None:
-    """Every key declares its meaning with `setting`, and its unit if its name ends in one."""
+    """Every key has a type, its meaning by `setting`, and its unit if its name ends in one."""
     for key, declaration in all_keys(keys_of(subject.component.config_class())).items():
         where, name = f"key {key!r}", key.rpartition(".")[2]
+        demand(
+            declaration["type"] != "None", f"{where} has no type: annotate it, as in `{name}: float = 1.0`"
+        )
         demand(
             bool(declaration["meaning"]),
             f"{where} declares no meaning, so `graspsense config show` cannot tell it. Declare the key as in "

@@ -93,7 +93,7 @@ def extracts_in_time(subject: Subject) -> None:
 
 
 def returns_the_declared_features(subject: Subject) -> None:
-    """Any trace (empty, short, without a channel, with gaps) gives the declared names and units, in their order."""
+    """Any trace (empty, short, without a channel, with gaps) gives floats of the declared names and units, in order."""
     declared = tuple((feature.name, feature.unit) for feature in subject.entry.features)
     for which, trace in _all(subject).items():
         features = _features(subject, trace, which)
@@ -103,6 +103,13 @@ def returns_the_declared_features(subject: Subject) -> None:
             f"on {which} it gives {_listed(given)}; `features` declares {_listed(declared)}: make `features` "
             "and what extract returns the same",
         )
+        for name, _, value in _values(features):
+            demand(
+                type(value) is float,
+                f"feature {name!r} is {value!r} of type {type(value).__name__} on {which}: write float(...)",
+            )
+        for name, reason in features.reasons.items():
+            demand(type(reason) is str, f"the reason of {name!r} is {reason!r} on {which}: write it as text")
 
 
 def units_are_of_the_si(subject: Subject) -> None:
@@ -117,19 +124,6 @@ def units_are_of_the_si(subject: Subject) -> None:
 
 def _listed(features: tuple[tuple[str, str], ...]) -> str:
     return ", ".join(f"{name} in {unit}" for name, unit in features) or "nothing"
-
-
-def values_are_floats(subject: Subject) -> None:
-    """Every value is a Python float, not an int or a scalar of numpy, and every reason is text."""
-    for which, trace in _all(subject).items():
-        features = _features(subject, trace, which)
-        for name, value in zip(features.names, features.values, strict=True):
-            demand(
-                type(value) is float,
-                f"feature {name!r} is {value!r} of type {type(value).__name__} on {which}: write float(...)",
-            )
-        for name, reason in features.reasons.items():
-            demand(type(reason) is str, f"the reason of {name!r} is {reason!r} on {which}: write it as text")
 
 
 def a_whole_grasp_has_features(subject: Subject) -> None:

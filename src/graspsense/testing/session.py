@@ -95,8 +95,11 @@ def opened(subject: Any, seed: int = 0, **keys: Any) -> Iterator[tuple[Any, Sess
         backend.close()
 
 
-def readings_of(subject: Any) -> Session:
-    """Open the gripper under check, use it for some seconds of its own clock, close it, and return the readings."""
+def readings_of(subject: Any, kind: int | None = None) -> Session:
+    """Open the gripper under check, use it for some seconds of its own clock, close it, and return the readings.
+
+    The fingers close by commands of this kind, by default the first one that it accepts.
+    """
     backend = subject.create()
     try:
         began = time.perf_counter()
@@ -106,7 +109,7 @@ def readings_of(subject: Any) -> Session:
             if info.opening is None:
                 use(session, backend, "recording", RECORDED_FRAMES, None)
             else:
-                kind = kind_of(subject.entry.accepts)
+                kind = kind_of(subject.entry.accepts) if kind is None else kind
                 use(session, backend, "opening", ticks_in(info, OPENING_S), info.opening)
                 use(session, backend, "closing", ticks_in(info, CLOSING_S), kind)
                 use(session, backend, "open again", ticks_in(info, OPENING_S), info.opening)

@@ -118,8 +118,9 @@ class Declared(ABC, Generic[EntryT]):
             if hasattr(module, name):
                 return getattr(module, name)
         except FAILURES as error:  # the import of a third party's module can raise anything
-            lacks = "; `pip check` says what is not installed" * isinstance(error, ModuleNotFoundError)
-            raise self._unavailable(f"{named(error)}{lacks}") from error
+            lacks = isinstance(error, ModuleNotFoundError) and not getattr(self.entry, "needs", "")
+            advice = "; `pip check` says what is not installed" * lacks
+            raise self._unavailable(f"{named(error)}{advice}") from error
         near = suggestion(name, dir(module))
         raise self._unavailable(f"{path} has no {name!r}" + (near and f".{near}"))
 
