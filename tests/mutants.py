@@ -343,7 +343,7 @@ measuring(
 
 for _value in (
     lambda value, trace: float(np.nansum(trace.force_left_n)),
-    lambda value, trace: float(np.nan_to_num(trace.force_left_n)[:600].max(initial=0.0)),
+    lambda value, trace: trace.force_left_n[np.argmax(trace.force_left_n > 1.0) :][:50].max(initial=0.0),
 ):
     measuring("times-are-those-of-the-clock", "means in place of sums", _value)
 for _unit, _measured in (
@@ -444,7 +444,12 @@ def counting_step(params, state, reading):
 
 
 law("same-tick-same-command", "changes a global", step=staticmethod(counting_step))
-commanding("commands-are-declared-and-finite", "makes sense in m and m/s", kind=VELOCITY, value=-10.0)
+law(
+    "commands-are-declared-and-finite",
+    "makes sense in m and m/s",
+    entry={"commands": ("velocity",)},
+    step=staticmethod(lambda *given: (Command(VELOCITY, -10.0, inf, inf), step(*given)[1])),
+)
 commanding(
     "state-holds-everything",
     "nothing in the class",

@@ -6,6 +6,7 @@ import keyword
 import re
 import sys
 from collections.abc import Mapping, Sequence
+from importlib.metadata import packages_distributions
 from importlib.resources import files
 from importlib.util import find_spec
 from pathlib import Path
@@ -18,7 +19,7 @@ from graspsense import __version__
 from graspsense.core.components.entries import TABLE_OF_ROLE
 from graspsense.core.components.firstparty import DISTRIBUTION, EXAMPLES, SHIPPED
 from graspsense.core.components.hookspecs import API
-from graspsense.core.components.registry import installed, installed_sources
+from graspsense.core.components.registry import canonical, installed, installed_sources
 from graspsense.core.values.errors import ConfigError, suggestion
 
 
@@ -282,9 +283,17 @@ def _check_importable(name: str) -> None:
         )
     if package in sys.stdlib_module_names:
         raise ConfigError(f"the name {name!r} is taken: Python itself has a module {package}")
+    if package not in sys.modules and find_spec(package) is None:
+        # Asking which distribution has it reads the lists of the files of all, which takes half a second.
+        return
     plugins = {source.distribution for source in installed_sources()}
-    if name not in plugins and (package in sys.modules or find_spec(package) is not None):
+    others = [
+        distribution
+        for distribution in packages_distributions().get(package, ())
+        if canonical(distribution) not in {name} & plugins
+    ]
+    if others:
         raise ConfigError(
-            f"the name {name!r} is taken: there is a package {package}, which this one would hide. Choose another "
-            f"name, as lab-{name}"
+            f"the name {name!r} is taken: {others[0]} has a package {package}, which this one would hide. Choose "
+            f"another name, as lab-{name}"
         )

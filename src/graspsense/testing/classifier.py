@@ -40,8 +40,8 @@ REFUSALS: Final = (KeyError, TypeError, ValueError, DataDamaged)
 
 OTHER_LABELS: Final = {
     "bottle:full_open": "7",
-    "bottle:empty_open": "7 ",
-    "can:full": "Große Dose, halb voll (zweite Messung)",
+    "bottle:empty_open": "07",
+    "can:full": " Große Dose, halb voll (zweite Messung)",
 }
 """Labels of another text for those of `sample_table`, as a user's table may have."""
 COMPLIANCE: Final = 1e-6

@@ -12,13 +12,14 @@ from zlib import crc32
 from attrs import define, field
 
 from graspsense.core.components.channels import dtype_of
+from graspsense.core.components.entries import KINDS
 from graspsense.core.components.roles import SensorBackend
 from graspsense.core.control.contact import CONTACT_FORCE_N
 from graspsense.core.control.garbage_collection import no_collection
 from graspsense.core.control.guard import GuardParams, GuardState, guard
 from graspsense.core.values.channel import FLOATS
 from graspsense.core.values.device import DeviceInfo
-from graspsense.core.values.errors import GraspsenseError, RecordingEnded
+from graspsense.core.values.errors import GraspsenseError, RecordingEnded, named
 from graspsense.core.values.signals import FORCE, Command, Frame, Image, Pads, Reading
 from graspsense.testing.checks import CheckFailed
 from graspsense.testing.laws import EFFORT_N, closing, kind_of
@@ -184,4 +185,13 @@ def use(
             if asked.kind == FORCE:
                 asked = asked._replace(value=max(asked.value, backend.least_force_n))
         allowed, watcher = guard(limits, watcher, frame, asked)
-        backend.apply(allowed)
+        try:
+            backend.apply(allowed)
+        except GraspsenseError:
+            raise
+        except Exception as error:
+            kind = KINDS[allowed.kind]
+            raise CheckFailed(
+                f"apply raised {named(error)} on a {kind} command, which `accepts` says it takes: take it, or take "
+                f"{kind!r} out of `accepts`"
+            ) from error
