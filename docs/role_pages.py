@@ -221,8 +221,12 @@ def hooks_page() -> str:
 def hook_example(spec: Any) -> str:
     """Return the module of a plugin that implements a hook as the example in its docstring does.
 
-    The example of a hook that gives entries is the statement that yields one.
+    The example of a hook that gives entries is the statement that yields one. A role that `plugins new` knows has the
+    module that it writes.
     """
+    if EXAMPLE not in inspect.cleandoc(spec.__doc__):
+        role = spec.__name__.removeprefix("graspsense_").removesuffix("s").replace("_", "-")
+        return plugin_module([role], words_of("lab-thing", [role])).rstrip()
     example = dedent(inspect.cleandoc(spec.__doc__).partition(EXAMPLE)[2])
     entry = re.match(r"yield (\w+)\(", example)
     if entry is None:

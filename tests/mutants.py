@@ -70,6 +70,7 @@ class Mutant:
 
 
 MUTANTS: list[Mutant] = []
+LEFT_OPEN: list[Any] = []
 ROLES = {
     FeatureSet: "feature-set",
     Controller: "controller",
@@ -166,8 +167,7 @@ class Reader(Peak):
 mutant("classes-can-be-imported", "No module named 'nowhere'", target="nowhere:Peak")(Peak)
 override(FeatureSet, "classes-can-be-imported", "does not implement extract")
 mutant("classes-can-be-imported", "does not declare `features`: write", features=None)(Peak)
-peak("declared-once", "requires stand both in the entry", requires=ENTRIES["feature-set"].requires)
-mutant("settings-have-types", "Annotate them", config=Untyped)(Peak)
+mutant("settings-declare-their-meaning", "annotate it", config=Untyped)(Peak)
 mutant("settings-declare-their-meaning", "declares no meaning", config=Undescribed)(Peak)
 mutant("settings-declare-their-meaning", 'unit="N"', config=Unitless)(Peak)
 mutant("defaults-are-what-their-types-say", "write 3.0", config=WholeDefault)(Peak)
@@ -217,27 +217,33 @@ featuring(
 featuring(AS_DECLARED, "peak in mN", units=("mN",))
 featuring("units-are-of-the-si", "'newton'", entry={"features": NEWTON}, units=("newton",))
 featuring("a-whole-grasp-has-features", "every feature is missing", values=(nan,), reasons={"peak": "lazy"})
-measuring("values-are-floats", "write float(...)", lambda peak, trace: peak if isnan(peak) else int(peak))
-measuring("values-are-floats", "of type float64", lambda peak, trace: np.float64(peak))
+measuring(
+    "returns-the-declared-features",
+    "write float(...)",
+    lambda peak, trace: peak if isnan(peak) else int(peak),
+)
+measuring("returns-the-declared-features", "of type float64", lambda peak, trace: np.float64(peak))
 measuring("same-trace-same-features", "no state between calls", lambda peak, trace: peak + next(_calls))
 measuring(
     "same-features-elsewhere", "sort what comes out of a set", lambda peak, trace: peak + hash("peak") % 2**40
 )
 measuring("same-features-elsewhere", "read no clock", lambda peak, trace: peak + time.localtime().tm_hour)
-measuring("values-are-floats", "use logging", lambda peak, trace: print(peak) or peak)  # noqa: T201
+measuring("returns-the-declared-features", "use logging", lambda peak, trace: print(peak) or peak)  # noqa: T201
 measuring(
-    "values-are-floats", "changes sys.stdout", lambda peak, trace: setattr(sys, "stdout", StringIO()) or peak
+    "returns-the-declared-features",
+    "changes sys.stdout",
+    lambda peak, trace: setattr(sys, "stdout", StringIO()) or peak,
 )
 measuring("values-fit-their-units", "convert it to its unit", lambda peak, trace: 1000.0 * peak)
 featuring("values-fit-their-units", "on an empty trace: return NaN", values=(0.0,), reasons={})
 measuring("values-fit-their-units", "without any channel", lambda peak, trace: -1.0 if len(trace) else peak)
-measuring("values-are-floats", "os._exit(0)", lambda peak, trace: os._exit(0))
+measuring("returns-the-declared-features", "os._exit(0)", lambda peak, trace: os._exit(0))
 measuring(
-    "values-are-floats",
+    "returns-the-declared-features",
     "changes the handler of Ctrl-C",
     lambda peak, trace: signal.signal(signal.SIGINT, signal.SIG_IGN) and peak,
 )
-featuring("values-are-floats", "write it as text", reasons=lambda features, trace: {"peak": 5})
+featuring("returns-the-declared-features", "write it as text", reasons=lambda features, trace: {"peak": 5})
 measuring(
     "extracts-in-time", "one more each time it extracts", lambda peak, trace: thread_of("peak") and peak
 )
@@ -335,11 +341,22 @@ measuring(
 )
 
 
-measuring(
-    "times-are-those-of-the-clock",
-    "means in place of sums",
+for _value in (
     lambda value, trace: float(np.nansum(trace.force_left_n)),
-)
+    lambda value, trace: trace.force_left_n[np.argmax(trace.force_left_n > 1.0) :][:50].max(initial=0.0),
+):
+    measuring("times-are-those-of-the-clock", "means in place of sums", _value)
+for _unit, _measured in (
+    ("N/m", lambda features, trace: (features.values[0] / 4.0,)),  # N/mm, of the 4 mm of the squeeze
+    ("m", lambda features, trace: (100.0 * trace.gap_m.max(initial=0.0),)),
+):
+    featuring(
+        "values-fit-their-units",
+        "follows its stiffness" if _unit == "N/m" else "give it in metres",
+        entry={"features": (Feature("peak", _unit, "in another unit"),)},
+        units=(_unit,),
+        values=_measured,
+    )
 
 
 class Foreseeing(Peak):
@@ -395,8 +412,8 @@ _grasps = itertools.count()
 
 law("ends-every-grasp", "return the greatest force", asked_force_n=lambda self: 1.0)
 law("step-is-a-plain-function", "staticmethod(step)", step=lambda self, *given: step(*given))
-law("params-are-numbers", "annotated float and is 1", params=lambda self: WholeParams(EFFORT, 1))
-law("state-is-numbers", "hold plain floats and ints", init=lambda self: Texts(2, 0, "calm"))
+law("params-and-state-are-numbers", "annotated float and is 1", params=lambda self: WholeParams(EFFORT, 1))
+law("params-and-state-are-numbers", "hold plain floats and ints", init=lambda self: Texts(2, 0, "calm"))
 law("starts-in-the-approach", "begins as APPROACH", init=lambda self: Law.init(self)._replace(phase=SQUEEZE))
 law("types-do-not-change", "the Command and the state", step=staticmethod(lambda *given: step(*given)[0]))
 leaving("types-do-not-change", "keep one type throughout", gap_m=1)
@@ -407,12 +424,14 @@ leaving(
     "NaN gives the safe result",
     phase=lambda after, frame: after.phase + 0 * int(frame.gap_m),
 )
-commanding("commands-are-numbers", "of type int: write a float", value=3)
-commanding("commands-are-of-declared-kinds", "add it to `commands`", kind=POSITION)
+commanding("commands-are-declared-and-finite", "of type int: write a float", value=3)
+commanding("commands-are-declared-and-finite", "add it to `commands`", kind=POSITION)
 commanding(
-    "commands-are-finite", "bound it", value=lambda command, frame: inf if frame.t_s > 1.0 else command.value
+    "commands-are-declared-and-finite",
+    "bound it",
+    value=lambda command, frame: inf if frame.t_s > 1.0 else command.value,
 )
-commanding("commands-are-finite", "a limit of 0 or more", effort_limit_n=nan)
+commanding("commands-are-declared-and-finite", "a limit of 0 or more", effort_limit_n=nan)
 commanding(
     "same-tick-same-command", "but its arguments", value=lambda command, _: command.value + _rng.random()
 )
@@ -425,7 +444,12 @@ def counting_step(params, state, reading):
 
 
 law("same-tick-same-command", "changes a global", step=staticmethod(counting_step))
-commanding("commands-are-finite", "makes sense in m and m/s", kind=VELOCITY, value=-10.0)
+law(
+    "commands-are-declared-and-finite",
+    "makes sense in m and m/s",
+    entry={"commands": ("velocity",)},
+    step=staticmethod(lambda *given: (Command(VELOCITY, -10.0, inf, inf), step(*given)[1])),
+)
 commanding(
     "state-holds-everything",
     "nothing in the class",
@@ -676,12 +700,21 @@ describing("objects-can-be-grasped", "give DeviceInfo(simulated=True, ...)", sim
 describing("describes-itself", "say in one line", name="two\nlines")
 
 giving("frames-are-numbers", "return Reading(Frame(...)")(lambda reading: reading.frame)
+hand(
+    "closes-in-any-state",
+    "leaves a connection or a file open",
+    open=lambda self, seed: (LEFT_OPEN.append(os.open(os.devnull, os.O_RDONLY)), Hand.open(self, seed))[1],
+)
 giving("closes-in-any-state", "return Reading(Frame(...)")(lambda reading: reading.frame)
 framing("frames-are-numbers", "gap_m of a frame is 0 of type int: write float(...)", gap_m=0)
 framing("channels-are-those-declared", "NaN in all", edge_left_n=nan)
 framing("time-runs-forward", "each is later than the last", t_s=1.0)
 framing("time-runs-forward", "dt_s is 1 s where", dt_s=1.0)
 framing("rate-is-as-declared", "stands still", t_s=0.0)
+framing(
+    "rate-is-as-declared", "gap is new", gap_m=lambda frame: 0.07 - (round(1e3 * frame.t_s) // 3 * 3e-4) ** 2
+)
+framing("squeezes-with-what-it-is-asked", "an effort that closes", effort_n=lambda frame: -frame.effort_n)
 framing("gap-is-in-metres", "divide by 1000", gap_m=lambda frame: 1000.0 * frame.gap_m)
 framing("gap-is-in-metres", "divide by 100)", gap_m=lambda frame: 100.0 * frame.gap_m)
 framing("forces-are-in-newtons", "give newtons", force_left_n=3000.0)
@@ -802,7 +835,7 @@ hand(
     closes_itself={"position": "a target"},
 )
 hand(
-    "accepts-every-declared-kind",
+    "stays-within-its-limits",
     "take it, or take 'force' out",
     entry={"accepts": ("effort", "force")},
     apply=lambda self, command: Hand.apply(self, command) if command.kind == EFFORT else 1 / 0,
@@ -838,21 +871,21 @@ hand(
 )
 
 
-@mutant("opens-and-closes-in-time", "raise NoDevice where nothing answers")
+@mutant("answers-in-time", "raise NoDevice where nothing answers")
 class SlowToOpen(Hand):
     def open(self, seed):
         time.sleep(0.3)
         return super().open(seed)
 
 
-@mutant("accepts-every-declared-kind", "make it a daemon")
+@mutant("stays-within-its-limits", "make it a daemon")
 class LeavesAThread(Hand):
     def open(self, seed):
         threading.Thread(target=time.sleep, args=(3.0,)).start()
         return super().open(seed)
 
 
-@giving("read-returns-within-its-timeout", "return None when nothing came in time")
+@giving("answers-in-time", "return None when nothing came in time")
 def _(reading):
     if 0.5 < reading.frame.t_s <= 0.501:
         until = time.perf_counter() + 1.3
@@ -1118,6 +1151,14 @@ nearest(
     to_json=lambda self: {**self._model, "mean": np.array(self._model["mean"])},
 )
 nearest("single-trials-agree", "predict each trial independently", probabilities=of_all_trials)
+nearest("single-trials-agree", "other support", support=lambda self, table: np.arange(float(len(table))))
+nearest(
+    "few-trials-are-refused-or-learned",
+    "learn from every trial",
+    fit=lambda self, table, labels, seed: Nearest.fit(
+        self, table.rows(np.arange(max(len(table) - 9, 2))), labels[: max(len(labels) - 9, 2)], seed
+    ),
+)
 nearest(
     "finds-features-by-their-names",
     "features in another order",
@@ -1127,7 +1168,9 @@ nearest(
 )
 nearest("handles-missing-values", "fill or skip missing values", probabilities=without_missing)
 fitting(
-    "one-label-is-refused-or-certain", "raise ValueError, or learn from", lambda labels: len(set(labels)) < 2
+    "few-trials-are-refused-or-learned",
+    "raise ValueError, or learn from",
+    lambda labels: len(set(labels)) < 2,
 )
 fitting(
     "few-trials-are-refused-or-learned",

@@ -85,7 +85,7 @@ def test_an_entry_is_completed_by_the_class():
     peak = part(Summit)
 
     assert peak.declared().requires == (Channel("force_left", "N"),)
-    assert (peak.declared().width, peak.entry.features, peak.declared_twice()) == ("width", None, ())
+    assert (peak.declared().width, peak.entry.features) == ("width", None)
 
 
 @every_case(
@@ -151,7 +151,6 @@ def test_what_features_and_laws_require_may_depend_on_their_settings():
 
     assert sided.declared().requires == (Channel("force_left", "N"),)
     assert sided.declared(PeakConfig(side="right")).requires == (Channel("force_right", "N"),)
-    assert sided.declared_twice() == ()
 
 
 def test_the_result_has_the_declared_names_and_units():

@@ -64,15 +64,15 @@ def raising(error: BaseException):
 
 
 COMPONENTS = {
-    "graspsense_sensor_backends": ("sensor-backend", "lab-hand", "lab_hand.backend:LabHand"),
-    "graspsense_controllers": ("controller", "gentle", "lab_hand.gentle:GentleController"),
-    "graspsense_feature_sets": ("feature-set", "stiffness", "lab_hand.stiffness:Stiffness"),
-    "graspsense_classifiers": ("classifier", "nearest", "lab_hand.nearest:Nearest"),
+    "graspsense_sensor_backends": ("sensor-backend", "lab-thing", "lab_thing.backend:LabThingGripper"),
+    "graspsense_controllers": ("controller", "lab-thing", "lab_thing.law:LabThingController"),
+    "graspsense_feature_sets": ("feature-set", "lab-thing", "lab_thing.features:LabThingFeatures"),
+    "graspsense_classifiers": ("classifier", "lab-thing", "lab_thing.classifier:LabThingClassifier"),
 }
 """Hooks of components; the role, the name and the target of what its example gives."""
 RESOURCES = {
     "graspsense_models": (ModelEntry, "lab-cans", "resource", "lab_hand:models/cans.json"),
-    "graspsense_datasets": (DatasetEntry, "lab-csv", "recordings", "lab_hand.csv:recordings"),
+    "graspsense_datasets": (DatasetEntry, "lab-thing", "recordings", "lab_thing.reader:recordings"),
     "graspsense_emulators": (EmulatorEntry, "lab-hand", "target", "lab_hand.emulator:emulate"),
     "graspsense_live_observers": (LiveObserverEntry, "lab-wall", "target", "lab_hand.wall:observe"),
     "graspsense_conformance_checks": (

@@ -6,6 +6,7 @@ The table holds names and import strings only, so that `--help` imports no plugi
 from __future__ import annotations
 
 import os
+import re
 import sys
 import traceback
 import warnings
@@ -292,17 +293,16 @@ def _whose(error: BaseException) -> str:
     from graspsense.core.components.registry import installed
 
     try:
-        statuses = installed().statuses
+        named = [(status.module, status.distribution) for status in installed().statuses]
+        named += [(part.entry.target, part.distribution) for part in installed().components()]
     except Exception:  # with GRASPSENSE_STRICT_PLUGINS, the error may be that of loading them
-        statuses = ()
+        named = []
     places = {}
-    for status in statuses:
-        module = sys.modules.get(status.module.partition(".")[0])
+    for name, distribution in named:
+        module = sys.modules.get(re.split("[.:]", name)[0])
         file = getattr(module, "__file__", None)
         if file and module is not sys.modules["graspsense"]:
-            places[os.path.dirname(file) + os.sep if hasattr(module, "__path__") else file] = (
-                status.distribution
-            )
+            places[os.path.dirname(file) + os.sep if hasattr(module, "__path__") else file] = distribution
     for frame in reversed(traceback.extract_tb(error.__traceback__)):
         for place, distribution in places.items():
             if frame.filename.startswith(place):

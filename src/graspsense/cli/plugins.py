@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from textwrap import wrap
 from typing import Any
@@ -314,15 +315,11 @@ def _advice(status: PluginStatus) -> tuple[str, ...]:
 
 def _clash(component: Component, loaded: Plugins) -> tuple[str, ...]:
     """Return what is to be done where others use the name of this component."""
-    others = [
-        other.qualified
-        for other in loaded.components(component.role)
-        if other.name == component.name and other.distribution != component.distribution
-    ]
+    others = loaded.namesakes(component)
     if not others:
         return ()
     return (
-        f"the {component.role.replace('-', ' ')} name {component.name!r} is also that of {', '.join(others)}: write "
+        f"the {component.kind} name {component.name!r} is also that of {', '.join(others)}: write "
         f'{component.table}.type = "{component.qualified}", or disable one of them',
     )
 
@@ -346,47 +343,49 @@ def _status_text(status: PluginStatus) -> str:
 
 
 def _described(component: Component) -> dict[str, Any]:
-    keys, reason = _keys(component)
+    """Return what a component declares as JSON values; where its class cannot be used here, `reason` says why."""
+    from graspsense.core.components.strict import keys_of
+
     names = ("role", "name", "qualified", "distribution", "version")
     described = {name: getattr(component, name) for name in names}
-    return {**described, "entry": attrs.asdict(_declared(component)), "keys": keys, "reason": reason}
+    keys, entry, reason = {}, component.entry, ""
+    try:
+        keys = keys_of(component.config_class())
+        component.component_class()
+    except PluginUnavailable as error:
+        reason = str(error)
+    with suppress(PluginUnavailable):
+        entry = component.declared()
+    return {**described, "entry": attrs.asdict(entry), "keys": keys, "reason": reason}
 
 
 def _component_text(component: Component) -> str:
-    declared = attrs.asdict(_declared(component), recurse=False)
-    entry = {key: value for key, value in declared.items() if value is not None}
+    described = _described(component)
+    entry = {key: value for key, value in described["entry"].items() if value is not None}
     lines = [f"{component.role} {component.qualified} {component.version}", f"  {entry['summary']}"]
     lines.append(f"  target       {entry['target']}")
-    for key in ("channels", "requires"):
+    for key in ("channels", "requires", "accepts", "commands", "alternatives"):
         if key in entry:
-            names = [
-                f"{channel.name} in {channel.unit}" + f" at {channel.rate_hz:g} Hz" * bool(channel.rate_hz)
-                for channel in entry[key]
-            ]
-            lines.append(f"  {key:<11}  {', '.join(names) or 'none'}")
-    for key in ("accepts", "commands", "alternatives"):
-        if key in entry:
-            lines.append(f"  {key:<11}  {', '.join(entry[key]) or 'none'}")
+            lines.append(f"  {key:<11}  {', '.join(map(_item, entry[key])) or 'none'}")
     if "features" in entry:
         lines.append("  features, with their units and meanings:")
-        lines += [f"    {feature.name} in {feature.unit}: {feature.meaning}" for feature in entry["features"]]
-    keys, reason = _keys(component)
-    if reason:
-        lines.append(f"  not usable here: {reason}")
-    elif keys:
+        lines += [f"    {_item(feature)}: {feature['meaning']}" for feature in entry["features"]]
+    if described["reason"]:
+        lines.append(f"  not usable here: {described['reason']}")
+    if described["keys"]:
         lines.append(
             f"  keys of [{component.table}], with their types, units, ranges, defaults and meanings:"
         )
-        lines += _key_lines(keys, "    ")
+        lines += _key_lines(described["keys"], "    ")
     return "\n".join(lines)
 
 
-def _declared(component: Component) -> Any:
-    """Return the entry with what the class declares; the entry alone where the class cannot be used here."""
-    try:
-        return component.declared()
-    except PluginUnavailable:
-        return component.entry
+def _item(declared: Any) -> str:
+    """Return a channel or a feature in words; the name of a kind of command as it is."""
+    if isinstance(declared, str):
+        return declared
+    rate_hz = declared.get("rate_hz", 0.0)
+    return f"{declared['name']} in {declared['unit']}" + f" at {rate_hz:g} Hz" * bool(rate_hz)
 
 
 def _key_lines(keys: dict[str, dict[str, Any]], indent: str) -> list[str]:
@@ -401,13 +400,3 @@ def _key_lines(keys: dict[str, dict[str, Any]], indent: str) -> list[str]:
         lines += wrap(text, 100, initial_indent=f"{indent}    ", subsequent_indent=f"{indent}    ")
         lines += _key_lines(declaration.get("keys", {}), f"{indent}    ")
     return lines
-
-
-def _keys(component: Component) -> tuple[dict[str, dict[str, Any]], str]:
-    """Return the keys of a component's config, or why they cannot be told."""
-    from graspsense.core.components.strict import keys_of
-
-    try:
-        return keys_of(component.config_class()), ""
-    except PluginUnavailable as error:
-        return {}, str(error)

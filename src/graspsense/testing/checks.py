@@ -18,7 +18,7 @@ from typing import Any, Final, Literal
 import numpy as np
 from attrs import define, field, frozen
 
-from graspsense.core.values.errors import FAILURES, GraspsenseError, exits_raise, named, place_of
+from graspsense.core.values.errors import FAILURES, GraspsenseError, NoDevice, exits_raise, named, place_of
 
 State = Literal["passed", "failed", "skipped", "expected failure"]
 
@@ -98,7 +98,7 @@ def raises_nothing(what: str, advice: str) -> Iterator[None]:
     """Raise CheckFailed for what is raised in this context: `what` raised it, and the advice."""
     try:
         yield
-    except CheckFailed:
+    except (CheckFailed, NoDevice):
         raise
     except Exception as error:
         cause = f"{what} raised {named(error)}{place_of(error)}"

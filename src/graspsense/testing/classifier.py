@@ -41,7 +41,7 @@ REFUSALS: Final = (KeyError, TypeError, ValueError, DataDamaged)
 OTHER_LABELS: Final = {
     "bottle:full_open": "7",
     "bottle:empty_open": "07",
-    "can:full": "Große Dose, halb voll (zweite Messung)",
+    "can:full": " Große Dose, halb voll (zweite Messung)",
 }
 """Labels of another text for those of `sample_table`, as a user's table may have."""
 COMPLIANCE: Final = 1e-6
@@ -92,11 +92,15 @@ def classes_are_the_labels(subject: Subject) -> None:
             isinstance(classes, tuple) and all(type(name) is str for name in classes),
             f"classes gives {classes!r}: return a tuple of str (convert text of numpy by str(...))",
         )
-        demand(
-            sorted(classes) == sorted(set(labels)),
-            f"classes gives {', '.join(classes)}; it was trained on {', '.join(sorted(set(labels)))}: keep labels as "
-            "they are, which can be any text",
-        )
+        _demand_classes(classes, labels, "keep labels as they are, which can be any text")
+
+
+def _demand_classes(classes: Sequence[str], labels: Sequence[str], advice: str) -> None:
+    """Raise CheckFailed unless the classes are the labels of the training."""
+    demand(
+        sorted(classes) == sorted(set(labels)),
+        f"classes gives {', '.join(classes)}; it was trained on {', '.join(sorted(set(labels)))}: {advice}",
+    )
 
 
 def probabilities_are_valid(subject: Subject) -> None:
@@ -228,14 +232,16 @@ def survives_json(subject: Subject) -> None:
 
 
 def single_trials_agree(subject: Subject) -> None:
-    """Trials predicted one by one have the same probabilities as all at once."""
+    """Trials predicted one by one have the same probabilities and support as all at once."""
     fitted, table, _ = _learned(subject)
-    whole = _shares(fitted, table)
-    single = np.concatenate([_shares(fitted, table.rows(np.array([i]))) for i in range(len(table))])
-    demand(
-        bool(np.allclose(whole, single, rtol=1e-9, atol=1e-12)),
-        "single trials have other probabilities than all at once: predict each trial independently",
-    )
+    rows = [table.rows(np.array([i])) for i in range(len(table))]
+    for what, answer in (("probabilities", fitted.probabilities), ("support", fitted.support)):
+        whole, single = answer(table), [answer(row) for row in rows]
+        demand(
+            whole is None
+            or bool(np.allclose(whole, np.concatenate(single), rtol=1e-9, atol=1e-12, equal_nan=True)),
+            f"single trials have other {what} than all at once: predict each trial independently",
+        )
 
 
 def finds_features_by_their_names(subject: Subject) -> None:
@@ -254,12 +260,15 @@ def handles_missing_values(subject: Subject) -> None:
     table, labels = sample_table(missing=True)
     bare, constant = table.values.copy(), table.values.copy()
     bare[:, 1], constant[:, 1] = math.nan, 0.05
+    lacking = np.where(np.array([label == labels[0] for label in labels])[:, np.newaxis], bare, table.values)
     for what, values in (
         ("some values missing", table.values),
         ("a whole feature missing", bare),
         ("a feature that is the same in all trials", constant),
+        ("a feature missing in all trials of a label", lacking),
     ):
         fitted = _fitted(subject, evolve(table, values=values), labels)
+        _demand_classes(fitted.classes(), labels, f"with {what}, learn from the values that are there")
         nothing = evolve(table, values=np.full((1, len(table.names)), math.nan))
         for asked in (table, nothing):
             _shares(fitted, asked, f"with {what} in training, ", "fill or skip missing values")
@@ -280,33 +289,31 @@ def _fitted_or_refused(subject: Subject, what: str, table: FeatureTable, labels:
     return classifier
 
 
-def one_label_is_refused_or_certain(subject: Subject) -> None:
-    """With one training label, `fit` raises ValueError, or that label has probability 1."""
-    table, labels = sample_table()
-    classifier = _fitted_or_refused(subject, "one label", table, ["can:full"] * len(labels))
-    if classifier is None:
-        return
-    given = classifier.probabilities(table)
-    demand(
-        classifier.classes() == ("can:full",) and bool((given == 1.0).all()),
-        f"trained on one label it gives {classifier.classes()} with {given[0]}",
-    )
-
-
 def few_trials_are_refused_or_learned(subject: Subject) -> None:
-    """With few training trials, `fit` raises ValueError, or the model gives valid probabilities."""
+    """With few training trials, of all labels or one, `fit` raises ValueError, or the model knows every label."""
     table, labels = sample_table()
-    for what, rows in (
-        ("two trials of two labels", [0, 1]),
-        ("one trial of each label", [0, 1, 2]),
-        ("two trials of one label and one of another", [0, 1, 3]),
-        ("two trials of each label", [0, 1, 2, 3, 4, 5]),
-    ):
-        few = table.rows(np.array(rows))
-        classifier = _fitted_or_refused(subject, what, few, [labels[i] for i in rows])
+    few = {
+        "two trials of two labels": [0, 1],
+        "one trial of each label": [0, 1, 2],
+        "two trials of one label and one of another": [0, 1, 3],
+        "two trials of each label": [0, 1, 2, 3, 4, 5],
+    }
+    cases = [(what, table.rows(np.array(rows)), [labels[i] for i in rows]) for what, rows in few.items()]
+    for i in range(
+        0, len(labels), 15
+    ):  # a model that leaves trials out, anywhere, lacks the label of one of these
+        cases.append(("one trial of a label", table, [*labels[:i], "rare", *labels[i + 1 :]]))
+    cases.append(("one label", table, ["can:full"] * len(labels)))
+    for what, trials, given in cases:
+        classifier = _fitted_or_refused(subject, what, trials, given)
         if classifier is None:
             continue
-        _shares(classifier, table, f"trained on {what}, ", "raise ValueError in fit, or answer")
+        shares = _shares(classifier, table, f"trained on {what}, ", "raise ValueError in fit, or answer")
+        demand(
+            what != "one label" or bool((shares == 1.0).all()),
+            f"trained on one label it gives it the probability {shares.min():g}: refuse it, or give 1",
+        )
+        _demand_classes(classifier.classes(), given, "raise ValueError in fit, or learn from every trial")
 
 
 def explains_its_predictions(subject: Subject) -> None:

@@ -41,37 +41,19 @@ def classes_can_be_imported(subject: Subject) -> None:
         raise
 
 
-def declared_once(subject: Subject) -> None:
-    """The entry does not repeat what the class declares."""
-    twice = subject.component.declared_twice()
-    demand(
-        not twice,
-        f"{', '.join(twice)} stand both in the entry and in {subject.component.entry.target}, and only the entry "
-        "counts: leave them out of the entry",
-    )
-
-
 def config_name(subject: Subject) -> str:
     """Return the import string of its config class."""
     cls = subject.component.config_class()
     return f"{cls.__module__}:{cls.__qualname__}"
 
 
-def settings_have_types(subject: Subject) -> None:
-    """Every key of the config class has a type, so that values from files can be checked."""
-    cls: Any = subject.component.config_class()
-    bare = [field.alias for field in attrs.fields(cls) if field.init and field.type is None]
-    demand(
-        not bare,
-        f"{config_name(subject)} has keys without a type: {', '.join(bare)}. Annotate them, as in "
-        f"`{(bare or ['key'])[0]}: float = 1.0`",
-    )
-
-
 def settings_declare_their_meaning(subject: Subject) -> None:
-    """Every key declares its meaning with `setting`, and its unit if its name ends in one."""
+    """Every key has a type, its meaning by `setting`, and its unit if its name ends in one."""
     for key, declaration in all_keys(keys_of(subject.component.config_class())).items():
         where, name = f"key {key!r}", key.rpartition(".")[2]
+        demand(
+            declaration["type"] != "None", f"{where} has no type: annotate it, as in `{name}: float = 1.0`"
+        )
         demand(
             bool(declaration["meaning"]),
             f"{where} declares no meaning, so `graspsense config show` cannot tell it. Declare the key as in "

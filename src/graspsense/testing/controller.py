@@ -6,7 +6,7 @@ import inspect
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from functools import cache
+from functools import cache, lru_cache
 from math import inf, isfinite
 from typing import Any, Final, NamedTuple, get_type_hints
 
@@ -76,12 +76,10 @@ class Tick(NamedTuple):
         return self.reading.frame
 
 
+@lru_cache(maxsize=4)
 def ticks_of(subject: Subject, object_name: str = "a soft object") -> list[Tick]:
     """Return the ticks of this law on the model_gripper, until it ends the grasp or for four seconds; computed once."""
-    kept: dict[str, list[Tick]] = subject.kept.setdefault("ticks", {})
-    if object_name not in kept:
-        kept[object_name] = fresh_ticks(subject, object_name)
-    return kept[object_name]
+    return fresh_ticks(subject, object_name)
 
 
 def fresh_ticks(
@@ -215,13 +213,9 @@ def step_is_a_plain_function(subject: Subject) -> None:
     )
 
 
-def params_are_numbers(subject: Subject) -> None:
-    """`params()` is a named tuple of floats and ints, with the annotated types."""
+def params_and_state_are_numbers(subject: Subject) -> None:
+    """`params()` and `init()` are named tuples of floats and ints, as annotated; a state also has read-only images."""
     _demand_numbers(subject.create().params(), "params")
-
-
-def state_is_numbers(subject: Subject) -> None:
-    """`init()` is a named tuple of floats and ints, with the annotated types, and of read-only arrays of an image."""
     _demand_numbers(subject.create().init(), "state")
 
 
@@ -254,40 +248,27 @@ def types_do_not_change(subject: Subject) -> None:
                 )
 
 
-def commands_are_numbers(subject: Subject) -> None:
-    """Every command is a Command with an integer kind and three floats."""
-    ticks_of(subject)
-
-
-def commands_are_of_declared_kinds(subject: Subject) -> None:
-    """Every command is of a kind that `commands` lists."""
-    for object_name in OBJECTS:
-        for tick in ticks_of(subject, object_name):
-            name = KINDS[tick.command.kind]
-            demand(
-                name in subject.entry.commands,
-                f"it commands {name} at t = {tick.frame.t_s:.3f} s with {object_name} between the fingers; "
-                f"its entry declares {', '.join(subject.entry.commands) or 'none'}: add it to `commands`",
-            )
-
-
-def commands_are_finite(subject: Subject) -> None:
-    """Values are finite, and limits are neither negative nor NaN, with any object between the fingers."""
+def commands_are_declared_and_finite(subject: Subject) -> None:
+    """With any object, commands are of kinds in `commands`, values finite, and limits neither negative nor NaN."""
     for object_name in OBJECTS:
         for tick in ticks_of(subject, object_name):
             command = tick.command
+            where = f"at t = {tick.frame.t_s:.3f} s with {object_name} between the fingers"
+            demand(
+                KINDS[command.kind] in subject.entry.commands,
+                f"it commands {KINDS[command.kind]} {where}; its entry declares "
+                f"{', '.join(subject.entry.commands) or 'none'}: add it to `commands`",
+            )
             most = GREATEST.get(command.kind, inf)
             demand(
                 isfinite(command.value) and abs(command.value) <= most,
-                f"it commands {command.value} at t = {tick.frame.t_s:.3f} s with {object_name} between the "
-                f"fingers: bound it; at most {most:g} makes sense in m and m/s",
+                f"it commands {command.value} {where}: bound it; at most {most:g} makes sense in m and m/s",
             )
             for name in ("effort_limit_n", "speed_limit_m_s"):
                 limit = getattr(command, name)
                 demand(
                     limit >= 0.0,
-                    f"{name} of a command is {limit} at t = {tick.frame.t_s:.3f} s: give a limit of 0 or more, or inf "
-                    "for none",
+                    f"{name} of a command is {limit} {where}: give a limit of 0 or more, or inf for none",
                 )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from copy import deepcopy
 from math import inf, nan
 from typing import Any, Final
@@ -22,8 +22,8 @@ from graspsense.testing.checks import demand, leaving_no_thread, raises_nothing
 from graspsense.testing.samples import (
     COLUMNS_OF_CHANNEL,
     an_event,
+    by_another_clock,
     contents_of,
-    shifted,
     squeeze,
     unusual_traces,
     with_channels,
@@ -33,8 +33,14 @@ from graspsense.testing.subject import Subject, elsewhere
 
 CUTS: Final = 48
 LONGEST_S: Final = 2.0
-FAR_BEYOND: Final = {"m": 200.0, "N": 200.0, "s": 3.0}
+FAR_BEYOND: Final = {"m": 200.0, "N": 50.0, "s": 3.0, "J": 10.0, "m/s": 50.0}
 """Factors that a sum (over frequencies, of times) does not reach, and a unit with the prefix milli exceeds."""
+STIFFNESSES_N_M: Final = (4000.0, 500.0)
+"""The stiffness of the objects of two grasps; that of a whole grasp comes first."""
+OTHER_PREFIX: Final = 30.0
+"""Factor by which a stiffness can be computed in another way, and that a prefix exceeds."""
+FEWER: Final = (1, 2, 4)
+"""In grasps with fewer ticks, these are each k-th one."""
 
 
 def _features(
@@ -50,7 +56,7 @@ def _features(
     return features
 
 
-def _whole(subject: Subject, stiffness_n_m: float = 4000.0) -> Trace:
+def _whole(subject: Subject, stiffness_n_m: float = STIFFNESSES_N_M[0]) -> Trace:
     """Return a whole grasp of a gripper that has the further channels in `requires`, with an event."""
     event = evolve(an_event(), source="controller")
     return with_signals(evolve(squeeze(stiffness_n_m), events=(event,)), subject.entry.requires)
@@ -87,7 +93,7 @@ def extracts_in_time(subject: Subject) -> None:
 
 
 def returns_the_declared_features(subject: Subject) -> None:
-    """Any trace (empty, short, without a channel, with gaps) gives the declared names and units, in their order."""
+    """Any trace (empty, short, without a channel, with gaps) gives floats of the declared names and units, in order."""
     declared = tuple((feature.name, feature.unit) for feature in subject.entry.features)
     for which, trace in _all(subject).items():
         features = _features(subject, trace, which)
@@ -97,6 +103,13 @@ def returns_the_declared_features(subject: Subject) -> None:
             f"on {which} it gives {_listed(given)}; `features` declares {_listed(declared)}: make `features` "
             "and what extract returns the same",
         )
+        for name, _, value in _values(features):
+            demand(
+                type(value) is float,
+                f"feature {name!r} is {value!r} of type {type(value).__name__} on {which}: write float(...)",
+            )
+        for name, reason in features.reasons.items():
+            demand(type(reason) is str, f"the reason of {name!r} is {reason!r} on {which}: write it as text")
 
 
 def units_are_of_the_si(subject: Subject) -> None:
@@ -113,19 +126,6 @@ def _listed(features: tuple[tuple[str, str], ...]) -> str:
     return ", ".join(f"{name} in {unit}" for name, unit in features) or "nothing"
 
 
-def values_are_floats(subject: Subject) -> None:
-    """Every value is a Python float, not an int or a scalar of numpy, and every reason is text."""
-    for which, trace in _all(subject).items():
-        features = _features(subject, trace, which)
-        for name, value in zip(features.names, features.values, strict=True):
-            demand(
-                type(value) is float,
-                f"feature {name!r} is {value!r} of type {type(value).__name__} on {which}: write float(...)",
-            )
-        for name, reason in features.reasons.items():
-            demand(type(reason) is str, f"the reason of {name!r} is {reason!r} on {which}: write it as text")
-
-
 def a_whole_grasp_has_features(subject: Subject) -> None:
     """For a whole grasp of an elastic object, at least one feature is defined."""
     features = _features(subject, _whole(subject))
@@ -137,16 +137,18 @@ def a_whole_grasp_has_features(subject: Subject) -> None:
 
 
 def values_fit_their_units(subject: Subject) -> None:
-    """No feature in m, N or s is far beyond what the grasp has of it; of what was not measured, none has a value."""
+    """No feature has another prefix than its unit, as a comparison of grasps tells; without measurements, no value."""
     trace = _whole(subject)
-    most = {"m": trace.gap_m.max(), "N": trace.force_left_n.max(), "s": trace.t_s[-1]}
-    for name, unit, value in _values(_features(subject, trace)):
+    most = _most(trace)
+    features = _features(subject, trace)
+    for name, unit, value in _values(features):
         limit = FAR_BEYOND.get(unit, 1.0) * most.get(unit, inf)
         demand(
             not abs(value) > limit,
             f"feature {name!r} is {value:g} {unit} in a grasp with gaps to {most['m']:.2g} m and forces to "
             f"{most['N']:.2g} N, of {most['s']:.2g} s: convert it to its unit, or declare the unit that it has",
         )
+    _demand_prefixes(subject, trace, features)
     unmeasured = {which: evolve(each, command=each.command * nan) for which, each in _all(subject).items()}
     for which, known in (("an empty trace", ()), ("a trace without any channel", ("s",))):
         for name, unit, value in _values(_features(subject, unmeasured[which], which)):
@@ -155,6 +157,34 @@ def values_fit_their_units(subject: Subject) -> None:
                 f"feature {name!r} is {value:g} {unit} on {which}: return NaN with a reason where nothing was "
                 "measured; 0 would be taken for a measured value",
             )
+
+
+def _most(trace: Trace) -> dict[str, float]:
+    """Return the most that a grasp has of each unit."""
+    gap_m, force_n = float(trace.gap_m.max()), float(trace.force_left_n.max())
+    speed_m_s = float(np.abs(trace.velocity_m_s).max())
+    return {"m": gap_m, "N": force_n, "s": float(trace.t_s[-1]), "J": force_n * gap_m, "m/s": speed_m_s}
+
+
+def _demand_prefixes(subject: Subject, trace: Trace, features: Features) -> None:
+    """Raise CheckFailed for a gap that is not in m, and for a stiffness or a compliance with a prefix."""
+    wider = _features(subject, evolve(trace, gap_m=trace.gap_m + 1e-3))
+    softer = _features(subject, _whole(subject, STIFFNESSES_N_M[1]))
+    ratio = STIFFNESSES_N_M[0] / STIFFNESSES_N_M[1]
+    for (name, unit, value), gap, soft in zip(_values(features), wider.values, softer.values, strict=True):
+        power = {"N/m": 1, "m/N": -1}.get(unit, 0)
+        follows = power and abs(value - ratio**power * soft) <= 0.2 * abs(value)
+        factor = abs(value) / STIFFNESSES_N_M[0] ** power if follows else 1.0
+        demand(
+            1.0 / OTHER_PREFIX <= factor <= OTHER_PREFIX,
+            f"feature {name!r} is {value:g} {unit} for an object of {STIFFNESSES_N_M[0]:g} N/m, and follows its "
+            "stiffness: convert it to its unit, or declare the unit that it has",
+        )
+        moved = abs(gap - value) / 1e-3 if unit == "m" else 0.0
+        demand(
+            not any(abs(moved - prefix) <= 1e-3 * prefix for prefix in (10.0, 100.0, 1000.0)),
+            f"feature {name!r} changes by {gap - value:g} m where the gaps are 0.001 m wider: give it in metres",
+        )
 
 
 def _values(features: Features) -> Iterator[tuple[str, str, float]]:
@@ -185,7 +215,7 @@ def same_trace_same_features(subject: Subject) -> None:
     """The same trace gives the same features with the same and with another instance."""
     set_, trace = subject.create(), _whole(subject)
     features = _features(subject, trace, set_=set_)
-    _features(subject, _whole(subject, stiffness_n_m=500.0), set_=set_)
+    _features(subject, _whole(subject, STIFFNESSES_N_M[1]), set_=set_)
     for again in (_features(subject, trace, set_=set_), _features(subject, trace)):
         demand(
             _same(features, again),
@@ -242,21 +272,28 @@ def requires_what_it_reads(subject: Subject) -> None:
 def times_are_those_of_the_clock(subject: Subject) -> None:
     """No feature, whatever its unit, follows the number of ticks of the same time."""
     whole = _whole(subject)
-    every, *others = (
-        _features(subject, _of_each(k, whole, subject), "a grasp with fewer ticks") for k in (1, 2, 4)
-    )
-    for i, (name, unit, value) in enumerate(zip(every.names, every.units, every.values, strict=True)):
-        fewer = [features.values[i] for features in others]
-        counted = all(
-            min(abs(few - value / k), abs(few - value * k)) <= 0.03 * abs(few) and abs(few) > 1e-9
-            for k, few in zip((2, 4), fewer, strict=True)
-        )
+    grasps = [_features(subject, _of_each(k, whole, subject), "a grasp with fewer ticks") for k in FEWER]
+    slower = _features(subject, by_another_clock(whole, slower=2.0), "a grasp that takes twice as long")
+    for i, (name, unit, value) in enumerate(_values(grasps[0])):
+        values = [features.values[i] for features in grasps]
+        # What knows no time, and changes by a tenth each time that half of the ticks are missing, counts them.
+        steps = np.diff(values) if slower.values[i] == value else np.zeros(2)
+        least = 0.1 * max(abs(value), abs(values[1]), 0.5 * _most(whole).get(unit, inf))
+        timeless = np.abs(steps).min() > least and steps[0] * steps[1] > 0.0
         demand(
-            not counted,
-            f"feature {name!r} is {value:g} {unit}, and {fewer[0]:g} {unit} where half of the ticks are missing: take "
+            not (timeless or any(_follows(values, power) for power in (-2.0, -1.0, -0.5, 0.5, 1.0, 2.0))),
+            f"feature {name!r} is {value:g} {unit}, and {values[1]:g} {unit} where half of the ticks are missing: take "
             "times from `trace.t_s`, means in place of sums, and differences over a time, since grippers have "
             "different rates",
         )
+
+
+def _follows(values: Sequence[float], power: float) -> bool:
+    """Return whether the values of grasps with fewer ticks are as this power of the number of the ticks."""
+    return all(
+        abs(few - values[0] * k**power) <= 0.03 * abs(few) and abs(few) > 1e-9
+        for k, few in zip(FEWER, values, strict=True)
+    )
 
 
 def _of_each(k: int, trace: Trace, subject: Subject) -> Trace:
@@ -269,10 +306,10 @@ def independent_of_the_start_of_the_clock(subject: Subject) -> None:
     """A shift of all times changes no feature beyond rounding."""
     whole = _whole(subject)
     exact = evolve(whole, t_s=np.round(whole.t_s * 2.0**30) / 2.0**30)  # whose differences are not rounded
-    early, late = (_features(subject, trace) for trace in (exact, shifted(exact, 64.0)))
+    early, late = (_features(subject, trace) for trace in (exact, by_another_clock(exact, seconds=64.0)))
     for name, a, b in zip(early.names, early.values, late.values, strict=True):
         demand(
-            (a != a and b != b) or abs(a - b) <= 1e-6 * max(1.0, abs(a)),
+            (a != a and b != b) or abs(a - b) <= max(1e-6, 1e-3 * abs(a)),
             f"feature {name!r} is {a:g}, and {b:g} for the same grasp with a clock that began 64 s earlier: use "
             "differences of times",
         )

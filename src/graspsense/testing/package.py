@@ -93,16 +93,13 @@ def everything_declared_loads(package: Package) -> None:
 
 def names_are_unique(package: Package) -> None:
     """No other installed distribution uses the name of one of its components or resources."""
-    others: list[Any] = [*package.plugins.components(), *package.plugins.all_resources()]
-    parts: list[Any] = [*package.components, *package.resources]
-    for mine in parts:
-        for other in others:
-            same_kind = type(other.entry) is type(mine.entry) and other.name == mine.name
-            demand(
-                not same_kind or other.distribution == package.distribution,
-                f"the name {mine.name!r} is taken by {other.qualified}: choose another name in the entry, or its users "
-                f'must write "{mine.qualified}"',
-            )
+    for mine in (*package.components, *package.resources):
+        others = package.plugins.namesakes(mine)
+        demand(
+            not others,
+            f"the name {mine.name!r} is taken by {', '.join(others)}: choose another name in the entry, or its users "
+            f'must write "{mine.qualified}"',
+        )
 
 
 def pipelines_fit_together(package: Package) -> None:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from math import isclose, isfinite, isinf, isnan, nan
+from math import inf, isclose, isfinite, isinf, isnan, nan
 from statistics import median
 from typing import Any, Final
 
 import numpy as np
 
 from graspsense.core.components.channels import declared_dtype, dtype_of, further, no_signals
-from graspsense.core.components.delivered import Delivered
+from graspsense.core.components.delivered import Delivered, numbers_of
 from graspsense.core.values.channel import FLOATS, Channel, FastChannel, TactileArray
 from graspsense.core.values.fingers import fingers_of, opposed_forces
 from graspsense.core.values.signals import (
@@ -110,14 +110,11 @@ def signals_are_those_declared(subject: Subject) -> None:
         if isinstance(channel, TactileArray) and channel.dtype != FLOATS:
             _demand_images(channel.name, [value.cells for value in values if value.counter])
             continue
-        if isinstance(channel, TactileArray) and channel.components > 1:
-            numbers = [number for value in values if value.counter for cell in value.cells for number in cell]
-        elif isinstance(channel, TactileArray):
-            numbers = [cell for value in values if value.counter for cell in value.cells]
-        elif isinstance(channel, FastChannel):
-            numbers = [number for value in values for row in value.values[: value.new] for number in row]
-        else:
-            numbers = values
+        if isinstance(channel, FastChannel):
+            values = [value._replace(values=value.values[: value.new]) for value in values]
+        numbers = [
+            number for value in values if getattr(value, "counter", True) for number in numbers_of(value)
+        ]
         wrong = next((number for number in numbers if type(number) is not float or isinf(number)), None)
         demand(wrong is None, f"{channel.name!r} has the value {wrong!r}: give finite floats, or NaN")
         demand(
@@ -273,7 +270,7 @@ def time_runs_forward(subject: Subject) -> None:
 
 
 def rate_is_as_declared(subject: Subject) -> None:
-    """Frames come at `rate_hz`, and no channel is declared with a higher rate."""
+    """Frames come at `rate_hz`, no channel is declared with a higher rate, and the gap is new as often as declared."""
     info, frames = subject.session.info, subject.session.frames
     passed = [now.t_s - earlier.t_s for earlier, now in pairwise(frames)]
     demand(bool(passed), "only one frame came")
@@ -291,6 +288,26 @@ def rate_is_as_declared(subject: Subject) -> None:
             f"channel {channel.name!r} is declared at {channel.rate_hz:g} Hz, the gripper gives "
             f"{info.rate_hz:g} frames a second: declare the rate at which its value is new",
         )
+        if channel.name == "gap":
+            new_hz = info.rate_hz * _share_of_new([frame.gap_m for frame in frames])
+            demand(
+                new_hz >= (1.0 - FORGIVEN) * channel.rate_hz,
+                f"the gap is new {new_hz:.3g} times a second while the fingers move, and declared at "
+                f"{channel.rate_hz:g} Hz: declare that rate, or give each frame what was measured for it",
+            )
+
+
+def _share_of_new(gaps: Sequence[float]) -> float:
+    """Return the share of the numbers that differ from the one before, where they change evenly and by many digits.
+
+    Fingers that move by less than the resolution from tick to tick give the same number again.
+    """
+    steps = np.abs(np.diff(gaps))
+    resolution = min(steps[steps > 0.0], default=inf)
+    pairs = steps[: len(steps) // 24 * 24].reshape(-1, 2, 12)
+    halves = pairs.sum(axis=2)
+    evenly = (halves.min(axis=1) > 36.0 * resolution) & (halves.max(axis=1) < 1.2 * halves.min(axis=1))
+    return float((pairs[evenly] > 0.0).mean()) if evenly.any() else 1.0
 
 
 def images_count_up(subject: Subject) -> None:

@@ -52,7 +52,7 @@ def what_it_delivers_is_kept(subject: Subject) -> None:
             write_npz(exported, read)
             _demand_same(grasp.trace, _replayed(read_named("npz", str(exported)), grasp.trace), "an export")
         except GraspsenseError as error:
-            raise CheckFailed(f"a grasp cannot be recorded and read back: {error}") from error
+            raise CheckFailed(f"a grasp cannot be recorded and read back: {error}", str(error)) from error
 
 
 def _recorded(subject: Subject, path: Path) -> tuple[Grasp, int]:

@@ -12,13 +12,12 @@ from attrs import evolve, fields
 
 from graspsense.core.components.channels import further
 from graspsense.core.values.channel import Channel, FastChannel, TactileArray
-from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.features import Features, FeatureTable
-from graspsense.core.values.signals import CHANNEL_OF_FIELD, EFFORT, Command, GraspEvent, Outcome, Pads, Phase
+from graspsense.core.values.signals import CHANNEL_OF_FIELD, GraspEvent, Outcome, Pads, Phase
 from graspsense.core.values.signals import Frame as _Frame
 from graspsense.core.values.trace import PAD_COLUMNS, ImageTrace, SampleTrace, SignalTrace, Trace, trace_of
 from graspsense.core.values.trial import RunInfo, Trial
-from graspsense.testing.model_gripper import CELLS, FIRST_PAD_CELL
+from graspsense.testing.model_gripper import CELLS, FIRST_PAD_CELL, model_gripper
 
 RATE_HZ: Final = 500.0
 COLUMNS_OF_CHANNEL: Final = {
@@ -111,15 +110,19 @@ def with_signals(trace: Trace, channels: Iterable[Channel]) -> Trace:
     return evolve(trace, signals=signals)
 
 
-def shifted(trace: Trace, seconds: float) -> Trace:
-    """Return the trace with all times shifted."""
+def by_another_clock(trace: Trace, seconds: float = 0.0, slower: float = 1.0) -> Trace:
+    """Return the trace with all times shifted, or as many times as long."""
     signals = {
-        name: signal if isinstance(signal, np.ndarray) else evolve(signal, t_s=signal.t_s + seconds)
+        name: signal if isinstance(signal, np.ndarray) else evolve(signal, t_s=slower * signal.t_s + seconds)
         for name, signal in trace.signals.items()
     }
-    events = tuple(evolve(event, t_s=event.t_s + seconds) for event in trace.events)
     return evolve(
-        trace, t_s=trace.t_s + seconds, pad_t_s=trace.pad_t_s + seconds, signals=signals, events=events
+        trace,
+        t_s=slower * trace.t_s + seconds,
+        velocity_m_s=trace.velocity_m_s / slower,
+        pad_t_s=slower * trace.pad_t_s + seconds,
+        signals=signals,
+        events=tuple(evolve(event, t_s=slower * event.t_s + seconds) for event in trace.events),
     )
 
 
@@ -206,16 +209,7 @@ def a_trial() -> Trial:
             names=names, values=(0.06, nan), units=("m", "N"), reasons={"f_steady": "not measured"}
         ),
         prediction=None,
-        device=DeviceInfo(
-            name="model_gripper",
-            clock="virtual",
-            simulated=True,
-            rate_hz=RATE_HZ,
-            effort_limit_n=100.0,
-            speed_limit_m_s=0.2,
-            opening=None,
-            relaxed=Command(EFFORT, 0.0, float("inf"), float("inf")),
-        ),
+        device=model_gripper(()).open(0),
         report={},
         counts={"ticks": 1200, "late": 0, "guarded": 0},
         events=(an_event(),),

@@ -12,13 +12,14 @@ from zlib import crc32
 from attrs import define, field
 
 from graspsense.core.components.channels import dtype_of
+from graspsense.core.components.entries import KINDS
 from graspsense.core.components.roles import SensorBackend
 from graspsense.core.control.contact import CONTACT_FORCE_N
 from graspsense.core.control.garbage_collection import no_collection
 from graspsense.core.control.guard import GuardParams, GuardState, guard
 from graspsense.core.values.channel import FLOATS
 from graspsense.core.values.device import DeviceInfo
-from graspsense.core.values.errors import GraspsenseError, RecordingEnded
+from graspsense.core.values.errors import GraspsenseError, RecordingEnded, named
 from graspsense.core.values.signals import FORCE, Command, Frame, Image, Pads, Reading
 from graspsense.testing.checks import CheckFailed
 from graspsense.testing.laws import EFFORT_N, closing, kind_of
@@ -35,7 +36,7 @@ class Session:
     """The readings by stage: `opening`, `closing`, `open again`; or `recording` for a recording."""
 
     info: DeviceInfo
-    opened_s: float
+    opened_s: float = 0.0
     """The time (s) that `open` took."""
     stages: dict[str, list[Reading]] = field(factory=dict)
     sums: list[tuple[int, ...]] = field(factory=list)
@@ -86,17 +87,20 @@ def next_reading(backend: SensorBackend[Any]) -> Reading | None:
 
 
 @contextmanager
-def opened(subject: Any, seed: int = 0, **keys: Any) -> Iterator[tuple[Any, DeviceInfo]]:
-    """Open the gripper under check within this context, with these settings as well."""
+def opened(subject: Any, seed: int = 0, **keys: Any) -> Iterator[tuple[Any, Session]]:
+    """Open the gripper under check within this context, with these settings as well, for a session without readings."""
     backend = subject.create(**keys)
     try:
-        yield backend, description(backend.open(seed))
+        yield backend, Session(description(backend.open(seed)))
     finally:
         backend.close()
 
 
-def readings_of(subject: Any) -> Session:
-    """Open the gripper under check, use it for some seconds of its own clock, close it, and return the readings."""
+def readings_of(subject: Any, kind: int | None = None) -> Session:
+    """Open the gripper under check, use it for some seconds of its own clock, close it, and return the readings.
+
+    The fingers close by commands of this kind, by default the first one that it accepts.
+    """
     backend = subject.create()
     try:
         began = time.perf_counter()
@@ -106,7 +110,7 @@ def readings_of(subject: Any) -> Session:
             if info.opening is None:
                 use(session, backend, "recording", RECORDED_FRAMES, None)
             else:
-                kind = kind_of(subject.entry.accepts)
+                kind = kind_of(subject.entry.accepts) if kind is None else kind
                 use(session, backend, "opening", ticks_in(info, OPENING_S), info.opening)
                 use(session, backend, "closing", ticks_in(info, CLOSING_S), kind)
                 use(session, backend, "open again", ticks_in(info, OPENING_S), info.opening)
@@ -114,7 +118,8 @@ def readings_of(subject: Any) -> Session:
     except GraspsenseError as error:
         raise CheckFailed(
             f"it cannot be used as it is set: {error}\n    give it the settings to be checked with (-o KEY=VALUE, or "
-            "`keys` in a test)"
+            "`keys` in a test)",
+            str(error),
         ) from error
     finally:
         began = time.perf_counter()
@@ -180,4 +185,13 @@ def use(
             if asked.kind == FORCE:
                 asked = asked._replace(value=max(asked.value, backend.least_force_n))
         allowed, watcher = guard(limits, watcher, frame, asked)
-        backend.apply(allowed)
+        try:
+            backend.apply(allowed)
+        except GraspsenseError:
+            raise
+        except Exception as error:
+            kind = KINDS[allowed.kind]
+            raise CheckFailed(
+                f"apply raised {named(error)} on a {kind} command, which `accepts` says it takes: take it, or take "
+                f"{kind!r} out of `accepts`"
+            ) from error

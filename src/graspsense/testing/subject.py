@@ -34,8 +34,6 @@ class Subject:
     keys: Mapping[str, Any] = field(factory=dict)
     unplugged: Mapping[str, Any] | None = None
     absent: Mapping[str, Any] | None = None
-    kept: dict[str, Any] = field(factory=dict, init=False)
-    """Values that several checks use, computed once."""
 
     @property
     def name(self) -> str:

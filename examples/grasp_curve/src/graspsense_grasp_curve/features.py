@@ -1,23 +1,11 @@
 """Eight features of a whole grasp, from the force over the gap and from the cell images.
 
-| feature | meaning | unit |
-|---|---|---|
-| peak_force | greatest mean force of the pads, from contact to the end of the hold | N |
-| gap_at_peak | gap at that instant | m |
-| stiffness_ratio | slope of force over gap in the second half of the squeeze's travel over that in the first | 1 |
-| hysteresis | share of the work of the squeeze that the release does not give back | 1 |
-| relaxation_time | time from the peak until the force has lost 63 % of what it loses by the end of the hold | s |
-| contact_area | cells of a gripping face above a tenth of the fullest one, at the peak, mean of both pads | cells |
-| contact_row | centre of the contact along the face, mean of both pads | rows |
-| contact_spread | standard deviation of the contact along the face, mean of both pads | rows |
-
 A cell image is taken relative to the last one before contact, so that no zero of the cells is in it.
 """
 
 from __future__ import annotations
 
 import math
-from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
@@ -33,7 +21,6 @@ from graspsense.plugin_api import (
     Features,
     FeatureSet,
     Trace,
-    create,
     missing,
     setting,
 )
@@ -84,7 +71,7 @@ class GraspCurveConfig:
 
 
 class GraspCurveFeatures(FeatureSet[GraspCurveConfig]):
-    """Extracts the eight features of the table above."""
+    """Extracts the eight features."""
 
     requires = CHANNELS
     features = CURVE
@@ -92,27 +79,6 @@ class GraspCurveFeatures(FeatureSet[GraspCurveConfig]):
     def extract(self, trace: Trace) -> Features:
         """Return the features; an undefined one is NaN with its reason."""
         return self.result(*_curve(trace, self.config.contact_force_n), trace.units)
-
-
-class ChittaAndCurve(FeatureSet[GraspCurveConfig]):
-    """The six features of Table I, then the eight: a union with this threshold of contact."""
-
-    requires = CHANNELS
-
-    @property
-    def features(self) -> tuple[Feature, ...]:  # type: ignore[override]
-        """The fourteen features."""
-        return self._union.features
-
-    def extract(self, trace: Trace) -> Features:
-        """Return the fourteen features."""
-        return self._union.extract(trace)
-
-    @cached_property
-    def _union(self) -> FeatureSet[Any]:
-        sets, contact_force_n = ("chitta", "grasp-curve"), self.config.contact_force_n
-        union: FeatureSet[Any] = create("feature-set", "union", sets=sets, contact_force_n=contact_force_n)
-        return union
 
 
 def _curve(trace: Trace, contact_force_n: float) -> tuple[dict[str, float], dict[str, str]]:

@@ -1,4 +1,4 @@
-"""The components of this distribution. numpy is imported when features are extracted."""
+"""The component of this distribution. numpy is imported when features are extracted."""
 
 from __future__ import annotations
 
@@ -11,14 +11,9 @@ GRASPSENSE_API = (2, 0)
 
 @hookimpl
 def graspsense_feature_sets() -> Iterable[FeatureSetEntry]:
-    """Return two sets: the eight features, and these after the six of Table I."""
+    """Return the set of the eight features."""
     yield FeatureSetEntry(
         name="grasp-curve",
         target="graspsense_grasp_curve.features:GraspCurveFeatures",
         summary="peak, stiffness ratio, hysteresis, relaxation and moments of the contact image",
-    )
-    yield FeatureSetEntry(
-        name="chitta-and-curve",
-        target="graspsense_grasp_curve.features:ChittaAndCurve",
-        summary="the six features of Table I and those of grasp-curve",
     )

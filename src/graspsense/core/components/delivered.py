@@ -104,15 +104,20 @@ def _problem(value: Any, shape: tuple[int, ...], dtype: str) -> str:
         return f"has {given} instead of {wanted}"
     if isinstance(value, Image) and dtype != FLOATS:
         return _array_problem(value.cells)
+    if isinstance(value, Samples) and (
+        any(len(row) != shape[1] for row in value.values) or not 0 <= value.new <= shape[0]
+    ):
+        return f"does not have {_sized(shape)} in each tick"
+    return "" if _are_numbers(numbers_of(value)) else "has a value that is not a number"
+
+
+def numbers_of(value: Any) -> Iterable[Any]:
+    """Return the numbers of a value of `Reading.signals`, which is no numpy array."""
+    if isinstance(value, Samples):
+        return chain.from_iterable(value.values)
     if isinstance(value, Image):
-        numbers: Iterable[Any] = chain.from_iterable(value.cells) if len(shape) > 1 else value.cells
-    elif isinstance(value, Samples):
-        if any(len(row) != shape[1] for row in value.values) or not 0 <= value.new <= shape[0]:
-            return f"does not have {_sized(shape)} in each tick"
-        numbers = chain.from_iterable(value.values)
-    else:
-        numbers = (value,)
-    return "" if _are_numbers(numbers) else "has a value that is not a number"
+        return chain.from_iterable(value.cells) if len(shape_of(value)) > 1 else value.cells
+    return (value,)
 
 
 def _array_problem(cells: Any) -> str:

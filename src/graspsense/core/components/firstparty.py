@@ -97,9 +97,7 @@ SHIPPED: Final = (
 """The distributions in `plugins`, for the hint if one is not installed."""
 
 EXAMPLES: Final = (
-    Shipped(
-        "graspsense-grasp-curve", "examples/grasp_curve", {"feature-set": ("grasp-curve", "chitta-and-curve")}
-    ),
+    Shipped("graspsense-grasp-curve", "examples/grasp_curve", {"feature-set": ("grasp-curve",)}),
 )
 """The distributions in `examples`, which are installed from a clone only."""
 

@@ -46,31 +46,12 @@ hookimpl = pluggy.HookimplMarker(PROJECT)
 
 @hookspec
 def graspsense_sensor_backends() -> Iterable[SensorBackendEntry]:  # type: ignore[empty-body]
-    """Return the [grippers](sensor-backend.md) of this plugin.
-
-    Example::
-
-        yield SensorBackendEntry(
-            name="lab-hand",
-            target="lab_hand.backend:LabHand",
-            summary="the two-finger hand of our lab, over a serial line",
-            needs="pip install pyserial",
-        )
-    """
+    """Return the [grippers](sensor-backend.md) of this plugin."""
 
 
 @hookspec
 def graspsense_controllers() -> Iterable[ControllerEntry]:  # type: ignore[empty-body]
-    """Return the [control laws](controller.md) of this plugin.
-
-    Example::
-
-        yield ControllerEntry(
-            name="gentle",
-            target="lab_hand.gentle:GentleController",
-            summary="closes ever more slowly",
-        )
-    """
+    """Return the [control laws](controller.md) of this plugin."""
 
 
 @hookspec
@@ -78,14 +59,6 @@ def graspsense_feature_sets() -> Iterable[FeatureSetEntry]:  # type: ignore[empt
     """Return the [feature sets](feature-set.md) of this plugin.
 
     `Feature(..., width=True)` marks the feature that is the width of the object.
-
-    Example::
-
-        yield FeatureSetEntry(
-            name="stiffness",
-            target="lab_hand.stiffness:Stiffness",
-            summary="slope of force over gap in the squeeze",
-        )
     """
 
 
@@ -95,14 +68,6 @@ def graspsense_classifiers() -> Iterable[ClassifierEntry]:  # type: ignore[empty
 
     A classifier always predicts a label that it was trained on: unknown trials are detected by [one
     rule](../evaluation.md#when-a-trial-is-unknown) for all.
-
-    Example::
-
-        yield ClassifierEntry(
-            name="nearest",
-            target="lab_hand.nearest:Nearest",
-            summary="the label of the nearest trial",
-        )
     """
 
 
@@ -143,14 +108,6 @@ def graspsense_datasets() -> Iterable[DatasetEntry]:  # type: ignore[empty-body]
     A data set with features of its own names a function `read(folder, features, *, unreliable) -> Labelled` as
     `target`: `features` is the feature set for traces, and `unreliable` says whether to include trials that the
     author of the data calls unreliable.
-
-    Example::
-
-        yield DatasetEntry(
-            name="lab-csv",
-            recordings="lab_hand.csv:recordings",
-            summary="the CSV files of our lab",
-        )
     """
 
 

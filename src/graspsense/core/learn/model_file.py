@@ -184,7 +184,8 @@ def classifier_from(
     except Exception as error:
         # What `from_json` may raise is about the file; anything else is a mistake of the classifier.
         place = "" if isinstance(error, KeyError | TypeError | ValueError) else place_of(error)
-        raise stored.refusal("model", f"{named(error)}{place}") from error
+        reader = f"{component.qualified} {component.version}"
+        raise stored.refusal("model", f"{named(error)}{place}, by {reader}, which reads it") from error
     return classifier
 
 

@@ -7,7 +7,8 @@ import json
 import os
 import re
 from collections.abc import Callable, Iterable, Mapping
-from importlib.metadata import Distribution, distributions
+from functools import partial
+from importlib.metadata import Distribution, EntryPoint, distributions
 from pathlib import Path
 from typing import Final
 
@@ -25,6 +26,14 @@ from graspsense.core.values.errors import ConfigError, suggestion
 ALLOWED_VARIABLE: Final = "GRASPSENSE_PLUGINS"
 """If this environment variable is set, only the distributions that it lists are loaded."""
 DISABLED_VARIABLE: Final = "GRASPSENSE_DISABLED_PLUGINS"
+ENTRY_POINT: Final = (
+    f'name its module in its pyproject.toml, under [project.entry-points."{ENTRY_POINT_GROUP}"], as in '
+    'lab-hand = "lab_hand.plugin", and install it again'
+)
+
+
+class PluginRefused(Exception):
+    """A plugin that breaks a rule; its text is the reason."""
 
 
 @define
@@ -145,8 +154,25 @@ def _sources_of(distribution: Distribution) -> list[PluginSource]:
     try:
         entry_points = distribution.entry_points.select(group=ENTRY_POINT_GROUP)
     except Exception as error:
-        return [PluginSource(name, version, "?", "entry_points.txt", _raising(error))]
-    return [PluginSource(name, version, point.name, point.value, point.load) for point in entry_points]
+        refused = PluginRefused(f"its entry points cannot be read ({error}): {ENTRY_POINT}")
+        return [PluginSource(name, version, "?", "entry_points.txt", _raising(refused))]
+    return [
+        PluginSource(name, version, point.name, point.value, partial(_loaded, point))
+        for point in entry_points
+    ]
+
+
+def _loaded(point: EntryPoint) -> object:
+    """Return what an entry point names. Raises PluginRefused where its module is not there, whatever that raises."""
+    module = point.value.partition(":")[0].strip()
+    if not re.fullmatch(r"[\w.]+", module):
+        raise PluginRefused(f"its entry point names {point.value!r}, which is no module: {ENTRY_POINT}")
+    try:
+        return point.load()
+    except ModuleNotFoundError as error:
+        if not f"{module}.".startswith(f"{error.name}."):
+            raise
+    raise PluginRefused(f"its entry point names the module {module!r}, which is not there: {ENTRY_POINT}")
 
 
 def _name_and_version(distribution: Distribution) -> tuple[str, str]:

@@ -19,7 +19,7 @@ import pluggy
 from graspsense import __version__
 from graspsense.core.components import hookspecs
 from graspsense.core.components.firstparty import DISTRIBUTION
-from graspsense.core.components.registry.discovery import PluginSource
+from graspsense.core.components.registry.discovery import PluginRefused, PluginSource
 from graspsense.core.components.registry.parts import PluginStatus
 from graspsense.core.values.errors import suggestion
 from graspsense.core.values.printable import printable
@@ -42,10 +42,6 @@ SLOW_WAIT_S: Final = 0.5
 _SPECS: Final = tuple(name for name in vars(hookspecs) if name.startswith("graspsense_"))
 
 _log = logging.getLogger("graspsense.plugins")
-
-
-class PluginRefused(Exception):
-    """A plugin that breaks a rule; its text is the reason."""
 
 
 class HookCalls:
@@ -214,4 +210,6 @@ def error_text(error: BaseException) -> str:
     # The first argument of an error of attrs is the sentence; the others are the attribute and the value.
     from_attrs = len(error.args) > 1 and isinstance(error.args[1], attrs.Attribute)
     text = str(error.args[0]) if from_attrs else str(error)
+    if isinstance(error, ModuleNotFoundError):
+        text += " (`pip check` says what is not installed)"
     return f"{type(error).__name__}: {text}" if text else type(error).__name__

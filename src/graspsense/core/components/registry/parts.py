@@ -37,6 +37,7 @@ from graspsense.core.values.errors import (
     ComponentFailed,
     ConfigError,
     PluginUnavailable,
+    named,
     suggestion,
 )
 
@@ -117,7 +118,9 @@ class Declared(ABC, Generic[EntryT]):
             if hasattr(module, name):
                 return getattr(module, name)
         except FAILURES as error:  # the import of a third party's module can raise anything
-            raise self._unavailable(f"{type(error).__name__}: {error}") from error
+            lacks = isinstance(error, ModuleNotFoundError) and not getattr(self.entry, "needs", "")
+            advice = "; `pip check` says what is not installed" * lacks
+            raise self._unavailable(f"{named(error)}{advice}") from error
         near = suggestion(name, dir(module))
         raise self._unavailable(f"{path} has no {name!r}" + (near and f".{near}"))
 
@@ -208,13 +211,6 @@ class Component(Declared[ComponentEntry]):
     def channels_vary(self) -> bool:
         """Return whether its channels depend on its settings. Raises PluginUnavailable."""
         return "channels" in self._left_out() and self._varies("channels")
-
-    def declared_twice(self) -> tuple[str, ...]:
-        """Return what both its entry and its class declare. Raises PluginUnavailable."""
-        left_out = self._left_out()
-        return tuple(
-            name for name in ROLES[self.role].declared if name not in left_out and self._of_class(name)
-        )
 
     def _left_out(self) -> tuple[str, ...]:
         """Return what its entry leaves to the class; one that declares its commands leaves no alternatives to them."""
@@ -344,7 +340,7 @@ class Resource(Declared[EntryT]):
         try:
             file = files(package).joinpath(path)
         except FAILURES as error:
-            raise self._unavailable(f"{type(error).__name__}: {error}") from error
+            raise self._unavailable(named(error)) from error
         if not file.is_file():
             raise self._unavailable(f"there is no file {path!r} in the package {package!r}")
         return file

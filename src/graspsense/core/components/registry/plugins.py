@@ -31,8 +31,9 @@ from graspsense.core.components.entries import (
     Role,
 )
 from graspsense.core.components.firstparty import provider
-from graspsense.core.components.hookspecs import ENTRY_POINT_GROUP
 from graspsense.core.components.registry.discovery import (
+    ENTRY_POINT,
+    PluginRefused,
     PluginSource,
     builtin_source,
     disabled_in_config,
@@ -43,7 +44,6 @@ from graspsense.core.components.registry.discovery import (
 from graspsense.core.components.registry.isolation import (
     TRACE_VARIABLE,
     HookCalls,
-    PluginRefused,
     advice_on,
     check_api,
     error_text,
@@ -52,6 +52,7 @@ from graspsense.core.components.registry.isolation import (
 from graspsense.core.components.registry.parts import (
     AnswerT,
     Component,
+    Declared,
     EntryT,
     HookAnswer,
     PluginStatus,
@@ -111,6 +112,11 @@ class Plugins:
         of_role = (part for part in self._parts if isinstance(part, Component) and role in (None, part.role))
         return tuple(sorted(of_role, key=lambda part: (order.index(part.role), part.name, part.distribution)))
 
+    def namesakes(self, part: Declared[Any]) -> tuple[str, ...]:
+        """Return the qualified names of the parts of other distributions with the kind and name of this one."""
+        same = (other for other in self._parts if (other.kind, other.name) == (part.kind, part.name))
+        return tuple(other.qualified for other in same if other.distribution != part.distribution)
+
     def feature_sets(self) -> tuple[FeatureSetEntry, ...]:
         """Return what each feature set declares; one whose class cannot be imported is left out."""
         entries = []
@@ -155,11 +161,7 @@ class Plugins:
             }
         )
         if name and any(distributions(name=name)):
-            return UnknownName(
-                f"{name} is installed and has no plugin: name its module in its pyproject.toml, under "
-                f'[project.entry-points."{ENTRY_POINT_GROUP}"], as in lab-hand = "lab_hand.plugin", and install it '
-                "again"
-            )
+            return UnknownName(f"{name} is installed and has no plugin: {ENTRY_POINT}")
         return UnknownName(
             f"no plugin or component named {name!r}. Known: {', '.join(known)}.{suggestion(name, known)}\n"
             "  One of your own is installed first: pip install -e FOLDER"
@@ -227,7 +229,9 @@ class Plugins:
                 )
                 raise
             broken = _status(source, "broken", f"{error_text(error)}{place_of(error)}")
-            self._statuses.append(evolve(broken, traceback="".join(traceback.format_exception(error))))
+            if not isinstance(error, PluginRefused):  # whose reason says all
+                broken = evolve(broken, traceback="".join(traceback.format_exception(error)))
+            self._statuses.append(broken)
             return
         status = evolve(
             _status(source, "loaded"),
@@ -298,6 +302,9 @@ class Plugins:
         present = {status.distribution for status in self._statuses}
         if by and canonical(wanted) in ("", by.distribution) and by.distribution not in present:
             raise UnknownName(f"no {title} named {name!r}. It is provided by {by.distribution}:\n  {by.hint}")
+        if wanted and canonical(wanted) not in present:
+            near = suggestion(wanted, present)
+            raise UnknownName(f"no {title} named {name!r}: no plugin of {wanted} is installed.{near}")
         names = sorted({*(part.qualified if wanted else part.name for part in known), *others})
         raise UnknownName(
             f"no {title} named {name!r}. Known: {', '.join(names) or 'none'}.{suggestion(name, names)}"
