@@ -65,7 +65,7 @@ def trained(name, **config):
         trials=15,
     )
     low = SupportClass(least=0.0, probabilities=(0.4, 0.9), rates=(0.3, 0.7), units=30.0)
-    of_label = dict.fromkeys(labels, LabelShare(share=0.9, low=0.7, high=1.1))
+    of_label = dict.fromkeys(labels, (LabelShare(share=0.9, low=0.7, high=1.1),) * 2)
     certainty = Certainty(classes=(low, evolve(low, least=4.0)), of_label=of_label, reach=2.0)
     model = evolve(model, sets=sets, certainty=certainty)
     return evolve(model, checkpoints=((0.2, checkpoint_model(model, 0.2, model)),))
@@ -167,6 +167,8 @@ def test_what_is_no_strict_json_is_refused(tmp_path, text, says):
         ("certainty.0.probabilities", [0.9, 0.4]),
         ("certainty.1.support", 0.0),
         ("certainty_of_label.bottle:empty", [0.95, 0.9, 1.1]),
+        ("certainty_of_label.bottle:empty", [[0.7, 0.9, 1.1]]),
+        ("certainty_of_label.bottle:empty", [[0.7, 0.9, 1.1], 0.9]),
         ("certainty_reach", -1.0),
         ("checkpoints.0.certainty", [{}]),
         ("sets.unknown", 16),

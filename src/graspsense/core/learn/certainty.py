@@ -14,7 +14,9 @@ Kish, Survey Sampling, 1965).
 Where labels are not equally frequent, answers with a rare one are right less often than others that are as probable. So
 a rate is multiplied by how often the answers with its label were right, as a share of what their rates promise. Where
 they were right more often than that, it is the wrong ones that are divided, so that no answer becomes certain. Of few
-answers that share is partly luck: it is drawn towards that of all labels as rare, which is drawn towards a half.
+answers that share is partly luck: it is drawn towards that of all labels as rare, which is drawn towards a half. Small
+leaves of one label may be right more often than those of another: a label has such a share in each class of support,
+drawn towards that of all its answers.
 
 The other labels share what remains in proportion to their probabilities. A probability of 0, as trees and nearest
 neighbours give it, says that few training trials had the label, and not that it is impossible.
@@ -51,6 +53,8 @@ LABEL_WEIGHT: Final = 7.0
 
 The labels whose answers are most often right are the luckiest ones.
 """
+CLASS_WEIGHT: Final = 20.0
+"""Number of answers that weigh as much as all answers with a label, in its share of a class of support."""
 FURTHER_UNITS: Final = 3.0
 """Units whose answers are all alike that count beside those that are known, for the variance between units."""
 AS_RARE: Final = 2.0
@@ -91,7 +95,7 @@ class LabelShare:
     high: float
 
 
-_EVERY_LABEL: Final = LabelShare(share=1.0, low=1.0, high=1.0)
+_ALL_RIGHT: Final = LabelShare(share=1.0, low=1.0, high=1.0)
 """The share where those of single labels are not known."""
 
 
@@ -109,13 +113,13 @@ def _share_of(rate: float, promised: float) -> float:
 class Certainty:
     """The rates of right answers by support and probability; the classes of support begin with the smallest.
 
-    Labels that were too seldom the answer are not in `of_label`: their certainty is not known. None is a model that was
-    measured before these were kept. The rates hold for trials that are outside of the training trials by no more than
-    `reach` (`learn.novelty`).
+    `of_label` has a share for each class of support. Labels that were too seldom the answer are not in it: their
+    certainty is not known. None is a model that was measured before these were kept. The rates hold for trials that are
+    outside of the training trials by no more than `reach` (`learn.novelty`).
     """
 
     classes: tuple[SupportClass, ...]
-    of_label: Mapping[str, LabelShare] | None = None
+    of_label: Mapping[str, tuple[LabelShare, ...]] | None = None
     reach: float = math.inf
 
     def class_of(self, support: NDArray[np.float64]) -> NDArray[np.int64]:
@@ -136,9 +140,9 @@ class Certainty:
         result = np.full((len(answers.columns), 3), np.nan)
         numbers, shares = self.class_of(answers.support).tolist(), answers.shares.tolist()
         for i, (k, value, label) in enumerate(zip(numbers, shares, answers.predicted, strict=True)):
-            own = _EVERY_LABEL if self.of_label is None else self.of_label.get(label)
-            if own is None:
+            if self.of_label is not None and label not in self.of_label:
                 continue
+            own = _ALL_RIGHT if self.of_label is None else self.of_label[label][k]
             of_class = self.classes[k]
             step = bisect_right(of_class.probabilities, value + _ROUNDING, lo=1) - 1
             rate = of_class.rates[step]
@@ -167,8 +171,10 @@ class Certainty:
         ]
         entries: dict[str, Any] = {"certainty": classes}
         if self.of_label is not None:
-            shares = {name: [own.low, own.share, own.high] for name, own in self.of_label.items()}
-            entries["certainty_of_label"] = shares
+            entries["certainty_of_label"] = {
+                name: [[own.low, own.share, own.high] for own in of_classes]
+                for name, of_classes in self.of_label.items()
+            }
         return entries | ({"certainty_reach": self.reach} if math.isfinite(self.reach) else {})
 
 
@@ -205,19 +211,28 @@ def certainty_from(stored: StoredValues) -> Certainty | None:
         )
     return Certainty(
         classes=tuple(classes),
-        of_label=_shares_from(stored.table("certainty_of_label")) if "certainty_of_label" in stored else None,
+        of_label=(
+            _shares_from(stored.table("certainty_of_label"), len(classes))
+            if "certainty_of_label" in stored
+            else None
+        ),
         reach=stored.number("certainty_reach", least=0.0) if "certainty_reach" in stored else math.inf,
     )
 
 
-def _shares_from(kept: StoredValues) -> dict[str, LabelShare]:
-    """Return the shares of the labels of a stored model. Raises DataDamaged."""
+def _shares_from(kept: StoredValues, classes: int) -> dict[str, tuple[LabelShare, ...]]:
+    """Return the shares of the labels of a stored model. Raises DataDamaged.
+
+    A model that was measured before each class had its own share has one of a label, for all classes.
+    """
     shares = {}
     for label in kept:
-        low, share, high = kept.numbers(label, (3,), least=0.0).tolist()
-        if not low <= share <= high:
+        own_of_class = any(isinstance(value, list) for value in kept.items(label))
+        numbers = kept.numbers(label, (classes, 3) if own_of_class else (3,), least=0.0).reshape(-1, 3)
+        if (np.diff(numbers) < 0.0).any():
             raise kept.refusal(label, "its interval does not hold its share")
-        shares[label] = LabelShare(share=share, low=low, high=high)
+        of_classes = [LabelShare(share=share, low=low, high=high) for low, share, high in numbers.tolist()]
+        shares[label] = tuple(of_classes if own_of_class else of_classes * classes)
     return shares
 
 
@@ -243,7 +258,10 @@ def certainty_of(
             _support_class(least, answers.shares[rows], correct[rows], weights[rows], effect, guessing)
         )
     of_all = Certainty(classes=tuple(classes))
-    return evolve(of_all, of_label=_shares(labels, correct, of_all.rate(answers), weights / effect, effect))
+    of_label = _shares(
+        labels, of_all.class_of(answers.support), correct, of_all.rate(answers), weights / effect, effect
+    )
+    return evolve(of_all, of_label=of_label)
 
 
 def _alike(of_unit: NDArray[np.float64]) -> float:
@@ -260,19 +278,25 @@ def _alike(of_unit: NDArray[np.float64]) -> float:
 
 def _shares(
     labels: NDArray[np.str_],
+    class_of: NDArray[np.int64],
     right: NDArray[np.float64],
     promised: NDArray[np.float64],
     weights: NDArray[np.float64],
     effect: float,
-) -> dict[str, LabelShare]:
-    """Return how often the answers with each label are right, as a share of the rates that they were promised."""
+) -> dict[str, tuple[LabelShare, ...]]:
+    """Return how often the answers with each label are right, as a share of the rates that they were promised.
+
+    A label has a share in each class of support.
+    """
     names, column = np.unique(labels, return_inverse=True)
-    units, right_in, promised_in = (
-        np.bincount(column, weights * counts).astype(np.float64)
-        for counts in (np.ones(len(labels)), right, promised)
-    )
+    shape = (len(names), int(class_of.max()) + 1)
     # Of all labels together, the rates promise enough: what they were drawn towards guessing is no share of a label.
-    right_in = right_in / max(float(right_in.sum() / promised_in.sum()), 1.0)
+    right = right / max(float((weights * right).sum() / (weights * promised).sum()), 1.0)
+    in_class = [
+        np.bincount(column * shape[1] + class_of, weights * counts, math.prod(shape)).reshape(shape)
+        for counts in (np.ones(len(labels)), right, promised)
+    ]
+    units, right_in, promised_in = (counts.sum(axis=1) for counts in in_class)
     shares = {}
     for k in np.flatnonzero(units * effect >= LABEL_UNITS - _ROUNDING).tolist():
         as_rare = units <= AS_RARE * units[k]
@@ -282,10 +306,28 @@ def _shares(
             usual = (float(right_in[as_rare].sum()) + LABEL_WEIGHT / 2.0) / (promised_as_rare + LABEL_WEIGHT)
         mean = float(promised_in[k] / units[k])
         rate = mean * (right_in[k] + LABEL_WEIGHT * usual) / (promised_in[k] + LABEL_WEIGHT)
-        low, high = _interval(rate, units[k])
-        low, share, high = (_share_of(float(end), mean) for end in (min(low, rate), rate, max(high, rate)))
-        shares[str(names[k])] = LabelShare(share=share, low=low, high=high)
+        own = _share_with_interval(float(rate), mean, float(units[k]))
+        of_classes = zip(*(counts[k].tolist() for counts in in_class), strict=True)
+        shares[str(names[k])] = (
+            (own,) if shape[1] == 1 else tuple(_share_in_class(own, *counts) for counts in of_classes)
+        )
     return shares
+
+
+def _share_in_class(own: LabelShare, units: float, right: float, promised: float) -> LabelShare:
+    """Return the share of a label in a class of support with so many of its answers, drawn towards its `own`."""
+    if units <= 0.0:
+        return own
+    mean = promised / units
+    rate = (right + CLASS_WEIGHT * _applied(mean, own.share)) / (units + CLASS_WEIGHT)
+    return _share_with_interval(rate, mean, units + CLASS_WEIGHT)
+
+
+def _share_with_interval(rate: float, promised: float, units: float) -> LabelShare:
+    """Return the share that makes this rate, which so many units tell, of the promised one."""
+    low, high = map(float, _interval(rate, units))
+    low, share, high = (_share_of(end, promised) for end in (min(low, rate), rate, max(high, rate)))
+    return LabelShare(share=share, low=low, high=high)
 
 
 def with_certainty(
