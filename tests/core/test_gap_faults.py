@@ -255,7 +255,6 @@ STRONGLY, WEAKLY = (Command(EFFORT, effort_n, inf, inf) for effort_n in (-20.0, 
         (OPENS, nan, False),
         # Twice the friction of 7 N opens the fingers until their stop.
         (STRONGLY, 0.077, True),
-        (STRONGLY, 0.0791, False),
         (WEAKLY, 0.077, False),
     ],
 )
