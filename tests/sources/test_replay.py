@@ -150,7 +150,7 @@ def damaged_files() -> list[tuple[str, bytes, str]]:
         (
             "nine_bits",
             good.replace(b"240.0", b"256.0", 1),
-            "line 4: thumb taxel value 256.0 is outside 0 to 255",
+            "line 4: thumb taxel value '256.0' is outside 0 to 255",
         ),
     ]
 

@@ -278,7 +278,8 @@ def _import(
             say(f"  {note}")
     if stored.kept:
         say(f"  {chosen.words}")
-        _echo_notices(_summary(recordings), doubts, err=values_alone())
+        for notice in (*_summary(recordings).notices, *doubts):
+            say(f"  {notice}", Style.CAUTION, indent=2)
     if again := [trial for trial in stored.kept if "earlier" in trial]:
         known = f"{again[0]['source']} is that of trial {again[0]['earlier']}"
         say(
@@ -387,7 +388,8 @@ def _show(
     echo_entry("thresholds", chosen.words.partition(": ")[2])
     some = "" if outcomes.total() == len(recordings) else f" (of {outcomes.total()} that were tried)"
     echo_entry("outcomes", ", ".join(f"{count} {words}" for words, count in ends.items()) + some)
-    _echo_notices(summary, doubts, err=False)
+    for notice in (*summary.notices, *doubts):
+        echo(f"  {notice}", Style.CAUTION, indent=2)
     middle = recordings[len(recordings) // 2]
     try:
         with readable(middle.labelled.source), handed_over(middle.name, middle.labelled.recording):
@@ -437,11 +439,3 @@ def _echo_summary(summary: ImportSummary) -> None:
 def _span(values: Sequence[float]) -> str:
     low, high = (f"{value:.4g}" for value in values)
     return low if low == high else f"{low} to {high}"
-
-
-def _echo_notices(summary: ImportSummary, of_rests: Sequence[str], *, err: bool) -> None:
-    """Print what looks wrong."""
-    from graspsense.sources.columns.recording_notices import in_grasps
-
-    for notice in [*in_grasps(summary.notices, summary.grasps), *of_rests]:
-        echo(f"  {notice}", Style.CAUTION, indent=2, err=err)

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Final
 
 from graspsense.core.learn.target_value import name_and_unit
@@ -71,30 +70,13 @@ UNITS: Final = frozenset((
 
 _OF_TIME: Final = re.compile(r"\W*t\b|.*(time|elapsed|duration|clock|zeit|dauer)", re.IGNORECASE)
 """A heading behind which these are units, and not the least one, a height or a diameter."""
-_ROUND: Final = str.maketrans("()", "[]")
 
 
 def unit_in(heading: str) -> str:
     """Return the unit behind a name: `Load [N]` or `Load (N)`. Only a time has minutes: `Load (min)` is the least."""
-    name, unit = name_and_unit(heading.translate(_ROUND))
+    name, unit = name_and_unit(heading.translate(str.maketrans("()", "[]")))
     symbol = unit in ("min", "h", "d") and not _OF_TIME.match(name)
     return unit if unit.lower() in UNITS - {*WITHOUT_UNIT} and not symbol else ""
-
-
-def names_and_units(headings: Sequence[str]) -> list[tuple[str, str]]:
-    """Return the names and the units of the columns of a table.
-
-    What stands in brackets behind columns of one name is a part of their names, unless these are units.
-
-    >>> names_and_units(["force [N]", "fill [score]", "cell [1]", "cell [2]"])
-    [('force', 'N'), ('fill', 'score'), ('cell [1]', ''), ('cell [2]', '')]
-    """
-    pairs = [name_and_unit(heading) for heading in headings]
-    alike = Counter(name for name, _ in pairs)
-    return [
-        pair if alike[pair[0]] == 1 or unit_in(heading) else (heading, "")
-        for heading, pair in zip(headings, pairs, strict=True)
-    ]
 
 
 _DATES_S: Final = (946_684_800.0, 4_102_444_800.0)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from itertools import pairwise
 from typing import Final
@@ -95,8 +95,8 @@ def with_notices(labelled: LabelledRecording) -> LabelledRecording:
     return evolve(labelled, notices=notices, recording=evolve(labelled.recording, notices=notices))
 
 
-def notices_together(recordings: Sequence[LabelledRecording]) -> tuple[tuple[str, int], ...]:
-    """Return what looks wrong in recordings, and in how many of them, the most frequent first.
+def notices_together(recordings: Sequence[LabelledRecording]) -> tuple[str, ...]:
+    """Return what looks wrong in recordings, the most frequent first, each with the number of recordings.
 
     What differs in its numbers alone is one, with the most frequent of these as an example.
     """
@@ -105,16 +105,11 @@ def notices_together(recordings: Sequence[LabelledRecording]) -> tuple[tuple[str
         alike = {re.sub(r"\d+(?:\.\d+)?", "0", notice): notice for notice in recording.notices}
         for kind, notice in alike.items():
             kinds.setdefault(kind, Counter())[notice] += 1
-    every = sorted(kinds.values(), key=lambda alike: -alike.total())
+    every, total = sorted(kinds.values(), key=lambda alike: -alike.total()), counted(len(recordings), "grasp")
     return tuple(
-        (f"{'for example, ' * (len(alike) > 1)}{alike.most_common(1)[0][0]}", alike.total())
+        f"{alike.total()} of {total}{', for example' * (len(alike) > 1)}: {alike.most_common(1)[0][0]}"
         for alike in every
     )
-
-
-def in_grasps(told: Iterable[tuple[str, int]], grasps: int) -> list[str]:
-    """Return what is told of some of so many grasps, each with the number of those."""
-    return [f"{count} of {counted(grasps, 'grasp')}: {what}" for what, count in told if count]
 
 
 @frozen(eq=False)

@@ -91,7 +91,7 @@ def _collected(
         divided = 1 < len({names for names, *_ in messages if names}) <= MOST_NAMES
         for names, recorded_ns, stamped_ns, numbers in messages:
             part = f"{topic}.{names}" if divided and names else topic
-            if times.setdefault(part, Messages()).add(recorded_ns, stamped_ns, numbers):
+            if times.setdefault(part, Messages()).add(recorded_ns, stamped_ns, [*numbers.values()]):
                 values.setdefault(part, []).append({f"{part}{k}": value for k, value in numbers.items()})
     values = {topic: value for topic, value in values.items() if value[0]}
     wanted = {topic for topic in values if any(name.startswith(f"{topic}.") for name in used)}

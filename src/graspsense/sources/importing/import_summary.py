@@ -54,8 +54,8 @@ class ImportSummary:
     """The first and the last time of recording; None unless every recording has one."""
     notes: tuple[str, ...]
     """How the first recording came about."""
-    notices: tuple[tuple[str, int], ...]
-    """What looks wrong, and in how many recordings; an example of what differs in its numbers alone."""
+    notices: tuple[str, ...]
+    """What looks wrong, and in how many recordings."""
     measured: tuple[ChannelFacts, ...]
     """What the samples of each channel show, in all recordings together; lengths in m."""
 

@@ -10,9 +10,9 @@ import numpy as np
 
 from graspsense.core.components.caller import set_option
 from graspsense.core.grasp.gap_resolution import gap_resolution
+from graspsense.core.values.errors import counted
 from graspsense.core.values.features import Features
 from graspsense.recording.replayable import Recording
-from graspsense.sources.columns.recording_notices import in_grasps
 
 MOST_TRAVEL: Final = 0.5
 """Share of the travel of a squeeze after a rest, and"""
@@ -36,8 +36,8 @@ def notices_of_rests(grasps: Sequence[tuple[Features, Recording]], role: str) ->
         "the gap has coarse steps, and stays for a large part of delta_t before the last one: the fingers go on "
         "within a step for as long and longer, so delta_t is too small, and cannot be told": rests_within_a_step,
     }
-    counts = ((what, sum(doubts(*grasp) for grasp in grasps)) for what, doubts in told.items())
-    return in_grasps(counts, len(grasps))
+    counts = {what: sum(doubts(*grasp) for grasp in grasps) for what, doubts in told.items()}
+    return [f"{count} of {counted(len(grasps), 'grasp')}: {what}" for what, count in counts.items() if count]
 
 
 def presses_on(features: Features, recording: Recording) -> bool:

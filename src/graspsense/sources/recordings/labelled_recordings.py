@@ -23,7 +23,7 @@ from graspsense.recording.controls import Controls, controls, without_constant_g
 from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
 from graspsense.recording.readable import each_readable, error_of_all, note_on
 from graspsense.recording.replayable import Recording, curve_bytes, grasp_numbers, recorded_channels
-from graspsense.sources.columns.recording_notices import in_grasps, notices_together
+from graspsense.sources.columns.recording_notices import notices_together
 from graspsense.sources.manifest.alike import compared
 from graspsense.sources.recordings.dataset_recordings import failing_as, readable_or_not
 from graspsense.sources.recordings.doubtful_rests import notices_of_rests
@@ -62,7 +62,7 @@ def labelled_recordings(
     table = table_of([features_of for features_of, _ in rows])
     notes, unlabelled = note_on(unreadable, len(read)), sum(not recording.label for recording in known)
     notes += [f"{counted(unlabelled, 'recording')} left out: no label"] if unlabelled else []
-    notes += in_grasps(notices_together(facts), len(facts))
+    notes += notices_together(facts)
     rests = [(extracted, fact.recording) for (extracted, _), fact in zip(rows, facts, strict=True)]
     notes += [*notices_of_rests(rests, "features"), *threshold_notes]
     units = {unit for fact in facts for unit in fact.recording.units.values()}

@@ -321,10 +321,9 @@ def _rest(
         speed = max(speed, travel / least)
     tried = measured[:: math.ceil(len(measured) / _MOST_TRIED)]
     candidates = [speed]
-    while "rest_speed_m_s" not in given and candidates[-1] * _FASTER <= max(slowest, speed):
+    is_open = not given.keys() & {"rest_speed_m_s", "rest_window_s"}
+    while is_open and candidates[-1] * _FASTER <= max(slowest, speed):
         candidates.append(candidates[-1] * _FASTER)
-    if "rest_window_s" in given:
-        del candidates[1:]
     pairs = [(v, _window(travel / v, least, scale)) for v in map(_rounded, candidates)]
     resting = [sum(recording.rests(contact, *pair) for recording in tried) for pair in pairs]
     enough = _REACHING * sum(bool((recording.both >= contact).any()) for recording in tried)
