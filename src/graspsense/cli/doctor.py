@@ -7,7 +7,7 @@ from typing import Any, Final
 import attrs
 import click
 
-from graspsense.cli.options import GRIPPER_ALONE, pipeline_options, settings_of, time_range
+from graspsense.cli.options import GRIPPER_ALONE, pipeline_options, settings_of, timeout_option
 from graspsense.cli.output import echo_values, json_option
 from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entry, state_style
 from graspsense.core.components.entries import Finding
@@ -22,14 +22,7 @@ _MARK: Final = 11
 
 @click.command()
 @pipeline_options
-@click.option(
-    "--timeout",
-    "timeout_s",
-    type=time_range(),
-    default=4.0,
-    show_default=True,
-    help="Measuring time for each plugin, in seconds.",
-)
+@timeout_option(4.0, "Measuring time")
 @click.option(
     "--latency",
     "repetitions",

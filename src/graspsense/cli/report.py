@@ -50,7 +50,7 @@ def report(
     """
     from graspsense.experiments.page import NAME, experiment_page
     from graspsense.experiments.results import EXPERIMENT, Results
-    from graspsense.report.number_section import number_sections, with_numbers
+    from graspsense.report.number_section import number_sections
     from graspsense.report.store_page import store_page
 
     path = Path(folder) / NAME if out is None or Path(out) == Path(folder) else page_to_write(out)
@@ -74,9 +74,9 @@ def report(
                 folds=folds,
                 seed=seed,
                 grasp=grasp,
+                numbers=numbers,
                 progress=progress,
             )
-        page = with_numbers(page, numbers)
     write_html(path, page)
     echo_values({"page": str(path), "answer": page.answer})
     echo(page.answer, Style.HEADING)

@@ -13,7 +13,7 @@ from graspsense.cli.live import LiveOptions, live_options, shown_live, viewer_op
 from graspsense.cli.live_rows import LiveRows
 from graspsense.cli.model_table import print_report
 from graspsense.cli.options import contradiction, names_object, pipeline_options, plot_option, settings_of
-from graspsense.cli.output import echo_values, json_option
+from graspsense.cli.output import echo_values, file_to_write, json_option
 from graspsense.cli.terminal import (
     LABEL_WIDTH,
     Style,
@@ -82,10 +82,14 @@ MANY_GUARDED: Final = 0.1
 @click.option(
     "--picture",
     metavar="FILE.png",
+    callback=file_to_write(".png"),
     help="Take a picture before the gripper opens again; for grippers with a view, such as mujoco.",
 )
 @click.option(
-    "--video", metavar="FILE", help="Film the grasp: .mp4, .webp or .gif; for grippers with a view."
+    "--video",
+    metavar="FILE",
+    callback=file_to_write(".mp4", ".webp", ".gif"),
+    help="Film the grasp: .mp4, .webp or .gif; for grippers with a view.",
 )
 @click.option("--viewer", is_flag=True, help="Show the grasp in a window; for grippers with a view.")
 @live_options

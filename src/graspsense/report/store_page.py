@@ -65,9 +65,12 @@ def store_page(
     folds: int = 10,
     seed: int = 0,
     grasp: int | None = None,
+    numbers: Sequence[Section] = (),
     progress: Progress | None = None,
 ) -> Page:
     """Return the page of the store in this folder; `grasp` is the number of the trial that is shown over time.
+
+    `numbers` are the sections of predicted numbers.
 
     Raises ConfigError if there is no store, no trial, or no trial of this number, and DataDamaged.
     """
@@ -100,7 +103,7 @@ def store_page(
     sections: list[Section] = []
     if evaluation is not None and labelled is not None:
         sections += result_sections(evaluation, learner, labelled)
-    sections += _measurement_sections(trial, curves, unreadable)
+    sections += [*numbers, *_measurement_sections(trial, curves, unreadable)]
     sections += _picture_section(folder, trial)
     if curves:
         sections.append(trial_curves(curves[:CURVES]))
