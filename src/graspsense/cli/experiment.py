@@ -175,7 +175,7 @@ def _list(known: Iterable[str]) -> None:
     echo_table(("EXPERIMENT", "TIME", "TASKS", "WHAT"), rows)
     echo(f"\nTIME is for {cores} cores, {ESTIMATED_FROM}.")
     echo(
-        "The first experiment after an installation compiles the simulator as well, about a minute in each process."
+        "The first experiment after an installation also compiles the simulator, which takes some tens of seconds."
     )
     echo(
         "`graspsense experiment NAME --dry-run` says what an experiment consists of; -o seeds=2 makes it shorter."
