@@ -130,9 +130,7 @@ def _print(diagnosis: HookAnswer[Finding]) -> None:
         mark = "PROBLEM" if finding.state == "problem" else finding.state
         echo_entry(f"  {mark}", f"{finding.subject}: {finding.words}", style, width=_MARK)
         if finding.state != "ok" and finding.advice:
-            if "\n" in finding.advice:
-                for line in filter(None, finding.advice.split("\n")):
-                    # Not wrapped: lines of a file, or commands, are copied.
-                    echo_as_it_is(f"             {line}")
-            else:
-                echo(f"             {finding.advice}")
+            # Several lines are not wrapped: those of a file, or commands, are copied.
+            say = echo_as_it_is if "\n" in finding.advice else echo
+            for line in filter(None, finding.advice.split("\n")):
+                say(f"             {line}")
