@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import click
+from attrs import evolve
 
 from graspsense.cli.options import SEED, target_option
 from graspsense.cli.output import echo_values, json_option, page_to_write
@@ -74,9 +75,9 @@ def report(
                 folds=folds,
                 seed=seed,
                 grasp=grasp,
-                numbers=numbers,
                 progress=progress,
             )
+        page = evolve(page, sections=(*numbers, *page.sections))
     write_html(path, page)
     echo_values({"page": str(path), "answer": page.answer})
     echo(page.answer, Style.HEADING)
