@@ -91,15 +91,16 @@ def test_an_error_is_red_and_fits_the_terminal():
         max_size=4,
     ),
     room=st.integers(10, 120),
+    short=st.sampled_from((8, 24)),
 )
-def test_columns_never_take_more_room_than_there_is(rows, room):
+def test_columns_never_take_more_room_than_there_is(rows, room, short):
     header = ("ONE", "TWO", "THREE")
     natural = [max(len(row[k]) for row in (header, *rows)) for k in range(3)]
-    widths = terminal._fitted(header, rows, natural, room)
+    widths = terminal._fitted(header, rows, natural, room, short)
 
     if widths is None:
         words = [max(len(word) for row in (header, *rows) for word in row[k].split()) for k in range(3)]
-        assert sum(min(n, max(24, word)) for n, word in zip(natural, words, strict=True)) > room
+        assert sum(min(n, max(short, word)) for n, word in zip(natural, words, strict=True)) > room
     else:
         assert sum(widths) <= room
         assert all(width <= most for width, most in zip(widths, natural, strict=True))

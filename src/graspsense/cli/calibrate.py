@@ -94,10 +94,10 @@ def gain(readings: str, replace: bool, **asked: Any) -> None:
     with _set_up(asked, replace) as setup:
         cells = _fingertips(setup).cells
         rows = _grouped(readings, "side", ("left", "right"), ("cell", "counts", "load_n"))
-        gains = {}
-        for side, numbers in rows.items():
-            gains[side] = counts_per_newton([(_cell(row[0]), row[1], row[2]) for row in numbers], cells)
-        _store(setup, "gain", {side: list(values) for side, values in gains.items()})
+        readings_of = {
+            side: [(_cell(cell), counts, load_n) for cell, counts, load_n in rows[side]] for side in rows
+        }
+        _store(setup, "gain", {side: list(counts_per_newton(readings_of[side], cells)) for side in rows})
 
 
 @calibrate.command("load-cell")

@@ -231,8 +231,8 @@ def pipeline_text(chosen: Chosen, model: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def say_chosen(chosen: Chosen, pipeline: str | None) -> None:
-    """Print what was chosen, the rate of the procedure, what is as good, and how to use it."""
+def say_chosen(chosen: Chosen, use: str) -> None:
+    """Print what was chosen, the rate of the procedure, what is as good, and the command that uses it."""
     choice = chosen.choice
     folds, same = sum(choice.chosen_in.values()), choice.chosen_in.get(choice.best.name, 0)
     stable = f"also in {same} of {folds} folds" if same else f"in each of {folds} folds another one"
@@ -244,5 +244,4 @@ def say_chosen(chosen: Chosen, pipeline: str | None) -> None:
     )
     echo_entry("as good", choice.ranking.equals)
     echo_entries("note", choice.ranking.notes)
-    if pipeline is not None:
-        echo_as_it_is(f"use it      graspsense run --pipeline {pipeline}")
+    echo_as_it_is(f"use it      graspsense {use}")

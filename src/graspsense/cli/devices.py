@@ -5,21 +5,14 @@ from __future__ import annotations
 import attrs
 import click
 
-from graspsense.cli.options import time_range
+from graspsense.cli.options import timeout_option
 from graspsense.cli.output import echo_values, json_option
 from graspsense.cli.terminal import echo, echo_table, state_style, talk
 from graspsense.core.components.registry import installed
 
 
 @click.command()
-@click.option(
-    "--timeout",
-    "timeout_s",
-    type=time_range(),
-    default=2.0,
-    show_default=True,
-    help="Time limit for each plugin, in seconds.",
-)
+@timeout_option(2.0, "Time limit")
 @json_option()
 def devices(timeout_s: float) -> None:
     """List connected grippers."""

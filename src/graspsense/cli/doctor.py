@@ -7,7 +7,7 @@ from typing import Any, Final
 import attrs
 import click
 
-from graspsense.cli.options import GRIPPER_ALONE, pipeline_options, settings_of, time_range
+from graspsense.cli.options import GRIPPER_ALONE, pipeline_options, settings_of, timeout_option
 from graspsense.cli.output import echo_values, json_option
 from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entry, state_style
 from graspsense.core.components.entries import Finding
@@ -22,14 +22,7 @@ _MARK: Final = 11
 
 @click.command()
 @pipeline_options
-@click.option(
-    "--timeout",
-    "timeout_s",
-    type=time_range(),
-    default=4.0,
-    show_default=True,
-    help="Measuring time for each plugin, in seconds.",
-)
+@timeout_option(4.0, "Measuring time")
 @click.option(
     "--latency",
     "repetitions",
@@ -137,9 +130,7 @@ def _print(diagnosis: HookAnswer[Finding]) -> None:
         mark = "PROBLEM" if finding.state == "problem" else finding.state
         echo_entry(f"  {mark}", f"{finding.subject}: {finding.words}", style, width=_MARK)
         if finding.state != "ok" and finding.advice:
-            if "\n" in finding.advice:
-                for line in filter(None, finding.advice.split("\n")):
-                    # Not wrapped: lines of a file, or commands, are copied.
-                    echo_as_it_is(f"             {line}")
-            else:
-                echo(f"             {finding.advice}")
+            # Several lines are not wrapped: those of a file, or commands, are copied.
+            say = echo_as_it_is if "\n" in finding.advice else echo
+            for line in filter(None, finding.advice.split("\n")):
+                say(f"             {line}")

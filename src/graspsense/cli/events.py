@@ -162,15 +162,9 @@ def _print_tables(evaluation: EventsEvaluation) -> None:
         "FALSE: false alarms, and their number a minute. DELAY: median (10 to 90 %), with the interval of the median."
     )
     echo("by chance: the same detections, moved by half of their recording")
-    scores = [
-        score
-        for kind in evaluation.kinds.values()
-        for score in (kind.fitted, kind.given)
-        if score is not None
-    ]
-    rates = [rate for score in scores for rate in (score.recall, score.precision) if rate is not None]
-    reasons = dict.fromkeys(rate.no_interval for rate in rates if rate.interval is None)
-    for reason in reasons:
+    scores = [score for kind in evaluation.kinds.values() for score in (kind.fitted, kind.given) if score]
+    rates = [rate for score in scores for rate in (score.recall, score.precision) if rate]
+    for reason in dict.fromkeys(rate.no_interval for rate in rates if rate.interval is None):
         echo(f"no interval: {reason}")
     echo()
     groups = [

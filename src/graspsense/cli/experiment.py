@@ -160,22 +160,14 @@ def _list(known: Iterable[str]) -> None:
     from graspsense.experiments.experiment_file import read_plan
 
     cores = os.cpu_count() or 1
-    planned = {name: read_plan(name) for name in known}
-    efforts = {name: effort_of(experiment) for name, experiment in planned.items()}
-    echo_values(
-        [
-            {"name": name, "title": experiment.experiment.title, **_effort_as_json(efforts[name])}
-            for name, experiment in planned.items()
-        ]
-    )
-    rows = [
-        (name, efforts[name].time_on(cores), str(efforts[name].tasks), experiment.experiment.title)
-        for name, experiment in planned.items()
-    ]
+    plans = [(name, read_plan(name)) for name in known]
+    listed = [(name, plan.experiment.title, effort_of(plan)) for name, plan in plans]
+    echo_values([{"name": name, "title": title, **_effort_as_json(effort)} for name, title, effort in listed])
+    rows = [(name, effort.time_on(cores), str(effort.tasks), title) for name, title, effort in listed]
     echo_table(("EXPERIMENT", "TIME", "TASKS", "WHAT"), rows)
     echo(f"\nTIME is for {cores} cores, {ESTIMATED_FROM}.")
     echo(
-        "The first experiment after an installation compiles the simulator as well, about a minute in each process."
+        "The first experiment after an installation also compiles the simulator, which takes some tens of seconds."
     )
     echo(
         "`graspsense experiment NAME --dry-run` says what an experiment consists of; -o seeds=2 makes it shorter."

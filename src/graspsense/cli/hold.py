@@ -90,5 +90,5 @@ class HoldRows:
     def summary(self) -> str:
         """Return the number of slips, and the greatest force while it was held."""
         if self._force_n != self._force_n:
-            return "no slip is told and no force measured: this gripper has no pads"
+            return "neither slips nor forces were measured: this gripper has no pads"
         return f"slips: {self._slips}; greatest force while holding: {self._greatest_n:.2f} N"

@@ -35,6 +35,12 @@ def time_range(longest_s: float | None = None) -> Finite:
     return Finite(0.0, longest_s, min_open=True)
 
 
+def timeout_option(default_s: float, text: str) -> Callable[[CommandT], CommandT]:
+    """Return the decorator that adds --timeout, a time for each plugin; `text` says what of."""
+    kind, text = time_range(), f"{text} for each plugin, in seconds."
+    return click.option("--timeout", "timeout_s", type=kind, default=default_s, show_default=True, help=text)
+
+
 def option_group(*options: Callable[[Any], Any]) -> Callable[[CommandT], CommandT]:
     """Return the decorator that adds these options, in their order."""
 

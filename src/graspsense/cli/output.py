@@ -71,10 +71,8 @@ def echo_found(table: FoundTable, styles: Mapping[str, StyleOf] | None = None) -
     echo_table(header, table.rows, styles)
 
 
-def file_to_write(
-    ending: str = "",
-) -> Callable[[click.Context, click.Parameter, str | None], str | None]:
-    """Return the callback of an option that names a file, of one format if it has to have an ending such as `.html`.
+def file_to_write(*endings: str) -> Callable[[click.Context, click.Parameter, str | None], str | None]:
+    """Return the callback of an option that names a file, with one of these endings if there are any, such as `.html`.
 
     A file that cannot be written is refused before the work and not after. So is a pipe or a device: the file that is
     written takes its place, also where root could replace it.
@@ -84,8 +82,9 @@ def file_to_write(
         if value is None:
             return None
         path = Path(value)
-        if ending and path.suffix.lower() != ending:
-            raise click.BadParameter(f"{value}: the name of the file must end in {ending}", ctx, param)
+        if endings and path.suffix.lower() not in endings:
+            wrong = f"{value}: the name of the file must end in {' or '.join(endings)}"
+            raise click.BadParameter(wrong, ctx, param)
         if path.is_dir():
             raise click.BadParameter(f"{value} is a folder: name a file in it", ctx, param)
         if path.exists() and not path.is_file():

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import click
+from attrs import evolve
 
 from graspsense.cli.options import SEED, target_option
 from graspsense.cli.output import echo_values, json_option, page_to_write
@@ -50,7 +51,7 @@ def report(
     """
     from graspsense.experiments.page import NAME, experiment_page
     from graspsense.experiments.results import EXPERIMENT, Results
-    from graspsense.report.number_section import number_sections, with_numbers
+    from graspsense.report.number_section import number_sections
     from graspsense.report.store_page import store_page
 
     path = Path(folder) / NAME if out is None or Path(out) == Path(folder) else page_to_write(out)
@@ -76,7 +77,7 @@ def report(
                 grasp=grasp,
                 progress=progress,
             )
-        page = with_numbers(page, numbers)
+        page = evolve(page, sections=(*numbers, *page.sections))
     write_html(path, page)
     echo_values({"page": str(path), "answer": page.answer})
     echo(page.answer, Style.HEADING)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from datetime import UTC, datetime
+from itertools import groupby
 from pathlib import Path
 from secrets import randbelow
 from typing import TYPE_CHECKING, Any, Final
@@ -13,7 +14,7 @@ from graspsense.cli.live import LiveOptions, live_options, shown_live, viewer_op
 from graspsense.cli.live_rows import LiveRows
 from graspsense.cli.model_table import print_report
 from graspsense.cli.options import contradiction, names_object, pipeline_options, plot_option, settings_of
-from graspsense.cli.output import echo_values, json_option
+from graspsense.cli.output import echo_values, file_to_write, json_option
 from graspsense.cli.terminal import (
     LABEL_WIDTH,
     Style,
@@ -82,10 +83,14 @@ MANY_GUARDED: Final = 0.1
 @click.option(
     "--picture",
     metavar="FILE.png",
+    callback=file_to_write(".png"),
     help="Take a picture before the gripper opens again; for grippers with a view, such as mujoco.",
 )
 @click.option(
-    "--video", metavar="FILE", help="Film the grasp: .mp4, .webp or .gif; for grippers with a view."
+    "--video",
+    metavar="FILE",
+    callback=file_to_write(".mp4", ".webp", ".gif"),
+    help="Film the grasp: .mp4, .webp or .gif; for grippers with a view.",
 )
 @click.option("--viewer", is_flag=True, help="Show the grasp in a window; for grippers with a view.")
 @live_options
@@ -338,9 +343,13 @@ def print_trial(trial: Trial, *, events: bool = True) -> None:
         echo_entry(name, _shown(value, unit, features.reasons.get(name, "")), width=wide)
     if more:
         echo_entry("features", more, width=wide)
-    for event in trial.trace.events if events else ():
-        unit = trial.trace.units["t"]
-        echo_entry("event", f"{event.what} at {event.t_s:.3f} {unit} ({event.phase.name.lower()})")
+    unit = trial.trace.units["t"]
+    for (what, phase), alike in groupby(
+        trial.trace.events if events else (), lambda event: (event.what, event.phase)
+    ):
+        begin_s, *again_s = (event.t_s for event in alike)
+        again = f", and {len(again_s)} more until {again_s[-1]:.3f} {unit}" if again_s else ""
+        echo_entry("event", f"{what} at {begin_s:.3f} {unit} ({phase.name.lower()}){again}")
     if trial.prediction is not None:
         prediction = trial.prediction
         certainty = f"  ({prediction.certainty_in_words})" if prediction.certainty_in_words else ""
@@ -364,7 +373,6 @@ def print_trial(trial: Trial, *, events: bool = True) -> None:
     if counts.get("late"):
         echo_entry("note", f"{counts['late']} of {counts['ticks']} frames came late")
     if trial.seconds_simulated is not None:
-        unit = trial.trace.units["t"]
         echo_entry("took", f"{trial.seconds_simulated:.2f} {unit} of grasp in {trial.seconds_wall:.2f} s")
 
 

@@ -193,8 +193,8 @@ def echo_table(
     """Print rows of text in columns; `styles` has the style of the cells of a column, by its header.
 
     On a terminal that is too narrow, long texts are wrapped within their columns. If there is no room for this, the
-    text of the last column stands below its row; if the others do not fit either, every row becomes a block with one
-    line for each column.
+    text of a long last column stands below its row, or shorter texts are wrapped too; else every row becomes a block
+    with one line for each column.
     """
     if not rows:
         return
@@ -211,17 +211,15 @@ def echo_table(
         ]
         _write(_row_lines(row, widths, right, looks), None, err=False)
 
-    widths = (
-        natural if columns is None else _fitted(header, rows, natural, columns - _GAP * (len(header) - 1))
-    )
+    room = 0 if columns is None else columns - _GAP * (len(header) - 1)
+    widths = natural if columns is None else _fitted(header, rows, natural, room, _SHORT)
+    last_below = sum(natural[:-1]) - _GAP <= room and natural[-1] > _SHORT
+    if widths is None and not last_below:
+        widths = _fitted(header, rows, natural, room, _SHORT // 3)
     if widths is not None:
         for row in (header, *rows):
             printed(row, widths)
-    elif (
-        columns is not None
-        and sum(natural[:-1]) + _GAP * (len(header) - 2) <= columns
-        and natural[-1] > _SHORT
-    ):
+    elif last_below:
         *_, last = of_column
         for row in (header, *rows):
             printed(row, natural[:-1])
@@ -291,13 +289,13 @@ def _all_numbers(cells: Sequence[str]) -> bool:
 
 
 def _fitted(
-    header: Sequence[str], rows: Sequence[Sequence[str]], natural: Sequence[int], room: int
+    header: Sequence[str], rows: Sequence[Sequence[str]], natural: Sequence[int], room: int, short: int
 ) -> list[int] | None:
-    """Return the widths of the columns within `room`, None if cells would have to be narrower than is readable."""
+    """Return the widths of the columns within `room`; None if a word, or a cell of up to `short`, has no room."""
     least = []
     for k, width in enumerate(natural):
         words = [len(word) for row in (header, *rows) for word in row[k].split()]
-        least.append(min(width, max(_SHORT, *words, 0)))
+        least.append(min(width, max(short, *words, 0)))
     spare = room - sum(least)
     if spare < 0:
         return None

@@ -132,7 +132,9 @@ def train(
     echo_values({"model": out, **_as_values(model), "trials": len(labelled), **choice})
     _say_trained(out, model)
     if trained is not None:
-        say_chosen(trained, pipeline)
+        say_chosen(
+            trained, f"run --pipeline {pipeline}" if pipeline else f"predict {shlex.quote(out)} OTHER.csv"
+        )
     else:
         _say_what_next(source, out, model, default=classifier is None and not given["options"])
 

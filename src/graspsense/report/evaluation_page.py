@@ -15,7 +15,7 @@ from graspsense.report.evaluation_sections import (
     tree_section,
 )
 from graspsense.report.html import Page, Section, bullets, facts, paragraph, table
-from graspsense.report.rates import RateRow
+from graspsense.report.rates import rate_row
 from graspsense.report.traces import features_by_class
 from graspsense.report.verdict import headline, verdict
 from graspsense.report.wording import TARGETS, about_grasps, control_words, protocol_words
@@ -61,9 +61,7 @@ def result_sections(evaluation: Evaluation, learner: SelectedComponent, labelled
     """Return the controls, the confusion matrix, the prediction sets, and a tree if the classifier grows one."""
     classifier = learner.component.name
     head = evaluation.headline
-    rows = [
-        RateRow(name=classifier, rate=head.rate, interval=head.interval, what="the answer above", strong=True)
-    ]
+    rows = [rate_row(classifier, head, "the answer above", strong=True)]
     missing = []
     for name, measured in {**evaluation.protocols, **evaluation.controls}.items():
         title, purpose = control_words(name, measured.what)
@@ -72,8 +70,7 @@ def result_sections(evaluation: Evaluation, learner: SelectedComponent, labelled
         elif name != evaluation.protocol:
             n = measured.rate.n
             among = "" if n == head.n else f" ({n} of {head.n} trials)"
-            interval = measured.rate.interval
-            rows.append(RateRow(name=title + among, rate=measured.rate.rate, interval=interval, what=purpose))
+            rows.append(rate_row(title + among, measured.rate, purpose))
     title = f"{classifier}: {evaluation.confusion.n} predictions"
     sections = [
         controls_section(rows, missing, classifier),

@@ -13,7 +13,7 @@ from graspsense.evaluation.intervals import percent
 from graspsense.evaluation.results import Confusion
 from graspsense.report.confusion import confusion_table
 from graspsense.report.html import Section, bullets, figure, folded, pair, paragraph, wide
-from graspsense.report.rates import RateRow, rates_list, rates_picture, rates_table
+from graspsense.report.rates import RateRow, rate_row, rates_list, rates_picture, rates_table
 from graspsense.report.svg import INKS, QUIET, AxisScale, Picture
 
 
@@ -50,16 +50,12 @@ def doubt_section(sets: SetCoverage, reliability: Reliability) -> Section:
     if sets.covered is None or sets.mean_size is None or sets.single is None:
         text += f" Not measured here: {sets.reason}."
     else:
-        rows = [
-            RateRow(name="all labels", rate=sets.covered.rate, interval=sets.covered.interval, strong=True)
-        ]
+        rows = [rate_row("all labels", sets.covered, strong=True)]
         if (below := sets.covered_below) is not None:
-            name = f"labels recognised in less than {100 * sets.asked:.0f} %"
-            rows.append(RateRow(name=name, rate=below.rate, interval=below.interval, strong=True))
-        rows += [
-            RateRow(name=name, rate=sets.by_label[name].rate, interval=sets.by_label[name].interval)
-            for name in natural_order(sets.by_label)
-        ]
+            rows.append(
+                rate_row(f"labels recognised in less than {100 * sets.asked:.0f} %", below, strong=True)
+            )
+        rows += [rate_row(name, sets.by_label[name]) for name in natural_order(sets.by_label)]
         text += (
             f" In held-out grasps the sets contain it in {sets.covered.words}. They have {sets.mean_size:.2f} "
             f"labels on average; {percent(sets.single.rate)} have a single one. The prediction is always a "

@@ -9,7 +9,6 @@ from typing import Any, Final
 from graspsense.core.control.tick import RELEASE
 from graspsense.core.values.errors import ConfigError, PluginUnavailable
 from graspsense.core.values.signals import Command, Reading
-from graspsense.report.write import require_writable
 
 FRAMES_HZ: Final = 25.0
 PACKAGES: Final = {".png": "PIL", ".gif": "PIL", ".webp": "PIL", ".mp4": "av"}
@@ -18,8 +17,6 @@ HINTS: Final = {
     "PIL": "pictures need Pillow: pip install 'graspsense[plot]'",
     "av": "a video as MP4 needs PyAV: pip install 'graspsense[video]', or write it as .webp or .gif",
 }
-PICTURE_FILES: Final = (".png",)
-VIDEO_FILES: Final = (".mp4", ".webp", ".gif")
 
 
 class Film:
@@ -29,11 +26,12 @@ class Film:
     """
 
     def __init__(self, picture: str | None, video: str | None, *, window: bool = False) -> None:
-        """Raises ConfigError or PluginUnavailable, before the grasp, where a file cannot be written."""
+        """Raises PluginUnavailable, before the grasp, without the package that writes a file."""
         self.window = window
         self.frames_hz = FRAMES_HZ if picture is not None or video is not None else 0.0
-        self._picture = None if picture is None else _checked(picture, PICTURE_FILES)
-        self._video = None if video is None else _checked(video, VIDEO_FILES)
+        self._picture, self._video = (
+            None if name is None else _checked(Path(name)) for name in (picture, video)
+        )
         self._last: Any = None
         self._frames: list[Any] = []
         self._is_over = False
@@ -80,16 +78,10 @@ def picture_of_trial(folder: str, number: int) -> Path:
     return Path(folder) / f"picture-{number}.png"
 
 
-def _checked(name: str, kinds: tuple[str, ...]) -> Path:
-    path = Path(name)
-    if path.suffix.lower() not in kinds:
-        raise ConfigError(f"{path} has no kind of file that can be written: {', '.join(kinds)}")
+def _checked(path: Path) -> Path:
     package = PACKAGES[path.suffix.lower()]
     if find_spec(package) is None:
         raise PluginUnavailable(HINTS[package])
-    if path.is_dir():
-        raise ConfigError(f"{path} is a folder: name a file in it")
-    require_writable(path)
     return path
 
 

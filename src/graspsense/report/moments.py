@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 from graspsense.core.values.signals import Phase
 from graspsense.core.values.trace import Floats, ImageTrace, Integers, Trace
 
+PHASE_COLOURS: Final = {"approach": "#e9eff6", "squeeze": "#fbdcb4", "hold": "#c9e6cf"}
+OTHER_PHASE: Final = "#f3f3f3"
+"""Background colours of the phases of a grasp; each phase is also named."""
 BEFORE_CONTACT_S: Final = 0.8
 """How much of the approach is shown where time is in seconds: the rest is motion through free air."""
 

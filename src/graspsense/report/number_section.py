@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
-from typing import Final
-
-from attrs import evolve
 
 from graspsense.core.learn.copies import without_copies
 from graspsense.core.values.errors import counted
@@ -15,12 +12,9 @@ from graspsense.regression.estimators import DEFAULT_ESTIMATOR
 from graspsense.regression.evaluate import evaluate_regression
 from graspsense.regression.results import RegressionError, RegressionEvaluation, RegressionMeasurement
 from graspsense.report.found_table import FoundTable
-from graspsense.report.html import Page, Section, bullets, figure, pair, paragraph, table
+from graspsense.report.html import Section, bullets, figure, pair, paragraph, table
 from graspsense.report.svg import INKS, QUIET, Picture, number, reaching
 from graspsense.store.dataset import labelled_store
-
-MEASUREMENTS: Final = "grasp"
-"""The section of the page of a store before which numbers stand."""
 
 
 def number_sections(
@@ -46,12 +40,6 @@ def number_sections(
         )
         for name in dict.fromkeys(names)
     ]
-
-
-def with_numbers(page: Page, numbers: Sequence[Section]) -> Page:
-    """Return the page of a store with the sections of its numbers, before its measurements."""
-    place = next(k for k, section in enumerate(page.sections) if section.id == MEASUREMENTS)
-    return evolve(page, sections=(*page.sections[:place], *numbers, *page.sections[place:]))
 
 
 def number_verdict(evaluation: RegressionEvaluation) -> str:

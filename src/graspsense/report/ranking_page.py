@@ -7,7 +7,7 @@ from graspsense.evaluation.over_seeds import MARGIN
 from graspsense.evaluation.ranking import Candidate, Ranking
 from graspsense.report.found_table import FoundTable
 from graspsense.report.html import Page, Section, bullets, facts, pair, paragraph
-from graspsense.report.rates import RateRow, rates_picture
+from graspsense.report.rates import rate_row, rates_picture
 from graspsense.report.verdict import in_hundred
 from graspsense.report.wording import CONTROLS, control_words, protocol_words
 
@@ -72,12 +72,7 @@ def _protocols(ranking: Ranking) -> list[str]:
 def _rates(ranking: Ranking) -> str:
     """Return the picture of the rates, beside the meaning of each protocol."""
     rows = [
-        RateRow(
-            name=_name(candidate),
-            rate=candidate.rates[ranking.protocol].rate,
-            interval=candidate.rates[ranking.protocol].interval,
-            strong=candidate.standing == "best",
-        )
+        rate_row(_name(candidate), candidate.rates[ranking.protocol], strong=candidate.standing == "best")
         for candidate in ranking.candidates
     ]
     bars = " Bars are 95 % intervals." if any(row.interval for row in rows) else ""

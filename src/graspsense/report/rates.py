@@ -8,7 +8,7 @@ from typing import Final
 
 from attrs import frozen
 
-from graspsense.evaluation.intervals import percent, span
+from graspsense.evaluation.intervals import RecognitionRate, percent, span
 from graspsense.report.html import facts, figure, table
 from graspsense.report.svg import (
     DASHES,
@@ -41,6 +41,11 @@ class RateRow:
     def words(self) -> str:
         """The rate in per cent with its interval."""
         return f"{percent(self.rate)} ({span(self.interval)})"
+
+
+def rate_row(name: str, measured: RecognitionRate, what: str = "", *, strong: bool = False) -> RateRow:
+    """Return the row of a rate of trials."""
+    return RateRow(name=name, rate=measured.rate, interval=measured.interval, what=what, strong=strong)
 
 
 ROW: Final = 34

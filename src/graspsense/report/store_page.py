@@ -100,10 +100,7 @@ def store_page(
     sections: list[Section] = []
     if evaluation is not None and labelled is not None:
         sections += result_sections(evaluation, learner, labelled)
-    sections += _measurement_sections(trial, curves, unreadable)
-    sections += _picture_section(folder, trial)
-    if curves:
-        sections.append(trial_curves(curves[:CURVES]))
+    sections += _measurement_sections(folder, trial, curves, unreadable)
     if labelled is not None:
         sections.append(features_section(labelled))
     sections.append(_provenance(folder, listed, trial, counts, changes))
@@ -167,9 +164,9 @@ def _answer(evaluation: Evaluation | None, total: int, problem: str) -> str:
 
 
 def _measurement_sections(
-    trial: StoredTrial, curves: Sequence[GraspCurve], unreadable: Sequence[UnreadableRecording]
+    folder: str, trial: StoredTrial, curves: Sequence[GraspCurve], unreadable: Sequence[UnreadableRecording]
 ) -> list[Section]:
-    """Return one grasp over time with its features, and some grasps of each label drawn over each other."""
+    """Return one grasp over time with its features and its picture, and grasps drawn over each other."""
     summary = trial.summary
     label = summary.label or NO_LABEL
     further = ""
@@ -199,6 +196,9 @@ def _measurement_sections(
         notes = note_on(unreadable, len(curves) + len(unreadable))
         body = paragraph(text) + traces_by_class(newest) + bullets(notes, "warning")
         sections.append(Section(id="traces", title="Force and gap over time", body=body))
+    sections += _picture_section(folder, trial)
+    if curves:
+        sections.append(trial_curves(curves[:CURVES]))
     return sections
 
 

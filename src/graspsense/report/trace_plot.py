@@ -11,6 +11,8 @@ from graspsense.core.values.fingers import FingerForce
 from graspsense.core.values.trace import Floats, ImageTrace, Integers, SampleTrace, Trace
 from graspsense.core.values.units import display_unit, without_underscores
 from graspsense.report.moments import (
+    OTHER_PHASE,
+    PHASE_COLOURS,
     array_images,
     contact_time,
     images_at,
@@ -21,8 +23,6 @@ from graspsense.report.moments import (
 )
 from graspsense.report.write import require_matplotlib, show_literally
 
-PHASE_COLOURS: Final = {"approach": "#e9eff6", "squeeze": "#fbdcb4", "hold": "#c9e6cf"}
-OTHER_PHASE: Final = "#f3f3f3"
 LEAST_NAMED: Final = 0.05
 """A phase that lasts less than this share of the grasp is shaded but not named."""
 AXIS_STYLES: Final = ("-", "--", ":", "-.")

@@ -16,7 +16,7 @@ from graspsense.core.values.signals import Phase
 from graspsense.core.values.units import display_unit, in_words, without_underscores
 from graspsense.report.grasp_curve import GraspCurve, peak_in_words
 from graspsense.report.html import figure, folded, panels, table
-from graspsense.report.moments import phase_spans
+from graspsense.report.moments import OTHER_PHASE, PHASE_COLOURS, phase_spans
 from graspsense.report.svg import DASHES, INKS, QUIET, SIZE, TEXT, AxisScale, Picture, lines_within, reaching
 
 STATES: Final = 8
@@ -25,13 +25,8 @@ LABEL: Final = 150.0
 """Room for a line of a label beside a picture."""
 DRAWN: Final = 150
 """Largest number of dots per label. If there are more trials, every n-th is drawn."""
-PHASES: Final = {
-    "approach": "var(--approach,#e9eff6)",
-    "squeeze": "var(--squeeze,#fbdcb4)",
-    "hold": "var(--hold,#c9e6cf)",
-}
-OTHER_PHASE: Final = "var(--phase,#f3f3f3)"
-"""Background colours of the phases of a grasp; each phase is also named."""
+PHASES: Final = {phase: f"var(--{phase},{colour})" for phase, colour in PHASE_COLOURS.items()}
+OTHER: Final = f"var(--phase,{OTHER_PHASE})"
 FORCE, GAP = (168.0, 40.0), (300.0, 208.0)
 """Lower and upper edge of the two plots in a picture of grasps."""
 BELOW: Final = 352.0
@@ -128,12 +123,12 @@ def _phases(picture: Picture, grasp: GraspCurve, t: Sequence[float], x_scale: Ax
     phases = np.array([Phase[name.upper()] for name in grasp.phase[: len(t)]])
     with picture.plot(x_scale, None, FORCE[1], GAP[0]):
         for phase, begin, end in phase_spans(np.array(t), phases):
-            left, colour = x_scale(begin), PHASES.get(phase, OTHER_PHASE)
+            left, colour = x_scale(begin), PHASES.get(phase, OTHER)
             picture.box(left, FORCE[1], x_scale(end) - left, GAP[0] - FORCE[1], colour)
             durations.append(f"{phase} for {end - begin:.2f}")
     for k, phase in enumerate(dict.fromkeys(grasp.phase)):
         x = 36 + 80.0 * k
-        picture.box(x, BELOW - 12, 12, 10, PHASES.get(phase, OTHER_PHASE), QUIET)
+        picture.box(x, BELOW - 12, 12, 10, PHASES.get(phase, OTHER), QUIET)
         picture.text(x + 16, BELOW - 3, phase)
     return durations
 

@@ -27,10 +27,6 @@ CONTROLS: Final[Mapping[str, tuple[str, str]]] = {
         "trials that belong together",
         "neither near copies nor neighbours that are alike were used for training, but perhaps the same objects",
     ),
-    "stratified_10_fold": (
-        "ten stratified folds",
-        "the same objects may occur in training and test, as in the paper",
-    ),
     "recording_order": (
         "order of recording",
         "training and test trials come from different times of the recording",
@@ -60,6 +56,8 @@ def about_grasps(features: Sequence[str], target: str, answers: int, guess: floa
 
 def control_words(name: str, what: str) -> tuple[str, str]:
     """Return the title of a control on a page, and its purpose; `what` is used for a control without an entry."""
+    if name.startswith("stratified_"):
+        return f"{name.split('_')[1]} stratified folds", "the same objects may occur in training and test"
     return CONTROLS.get(name, (name.replace("_", " "), what))
 
 

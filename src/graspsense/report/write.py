@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import tempfile
 import warnings
 from pathlib import Path
 from typing import Any, Final
@@ -34,16 +33,6 @@ def new_figure(width_in: float, height_in: float, dpi: int = 120) -> Any:
     figure = Figure(figsize=(width_in, height_in), dpi=dpi, layout="constrained")
     FigureCanvasAgg(figure)
     return figure
-
-
-def require_writable(path: Path) -> None:
-    """Raise ConfigError if no file can be written in the folder of `path`."""
-    if not path.parent.is_dir():
-        raise ConfigError(f"{path} cannot be written: there is no folder {path.parent}")
-    try:
-        tempfile.TemporaryFile(dir=path.parent).close()
-    except OSError as error:
-        raise ConfigError(f"{path} cannot be written: {error.strerror}") from error
 
 
 def write_html(path: Path, page: Page) -> None:

@@ -135,7 +135,7 @@ def labelled_store(
         table=tables.features,
         labels=tuple(label or "" for label in rows.label),
         instances=None if None in rows.instance else tuple(str(instance) for instance in rows.instance),
-        no_instances=f"{counted(rows.instance.count(None), 'trial')} without the individual object (can:full_open#2)",
+        no_instances=f"{counted(rows.instance.count(None), 'trial')} that name no individual, as can:full_open#2 does",
         recorded_with={"settings of gripper, controller or features": rows.recipe},
         order=order,
         no_order=no_order,

@@ -290,7 +290,8 @@ def _wrong_in_call(node: ast.Call) -> Iterator[str]:
     name = node.func.id if isinstance(node.func, ast.Name) else ""
     if name not in FUNCTIONS:
         known = ", ".join(FUNCTIONS)
-        yield f"no function {name or 'of this kind'}. There are {known}.{suggestion(name, FUNCTIONS)}"
+        quoted = "A column whose name has parentheses stands in quotes, as 'Load (N)'"
+        yield f"no function {name or 'of this kind'}. {quoted}. Functions: {known}.{suggestion(name, FUNCTIONS)}"
     if node.keywords or any(isinstance(argument, ast.Starred) for argument in node.args):
         yield f"{name} takes columns, separated by commas"
     if not node.args or (name not in FOLDS and len(node.args) != 1):
