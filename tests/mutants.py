@@ -13,7 +13,7 @@ import time
 from dataclasses import dataclass
 from functools import partial
 from io import StringIO
-from math import inf, isnan, nan
+from math import inf, nan
 from typing import Any, NamedTuple
 
 import attrs
@@ -217,11 +217,6 @@ featuring(
 featuring(AS_DECLARED, "peak in mN", units=("mN",))
 featuring("units-are-of-the-si", "'newton'", entry={"features": NEWTON}, units=("newton",))
 featuring("a-whole-grasp-has-features", "every feature is missing", values=(nan,), reasons={"peak": "lazy"})
-measuring(
-    "returns-the-declared-features",
-    "write float(...)",
-    lambda peak, trace: peak if isnan(peak) else int(peak),
-)
 measuring("returns-the-declared-features", "of type float64", lambda peak, trace: np.float64(peak))
 measuring("same-trace-same-features", "no state between calls", lambda peak, trace: peak + next(_calls))
 measuring(
@@ -444,12 +439,6 @@ def counting_step(params, state, reading):
 
 
 law("same-tick-same-command", "changes a global", step=staticmethod(counting_step))
-law(
-    "commands-are-declared-and-finite",
-    "makes sense in m and m/s",
-    entry={"commands": ("velocity",)},
-    step=staticmethod(lambda *given: (Command(VELOCITY, -10.0, inf, inf), step(*given)[1])),
-)
 commanding(
     "state-holds-everything",
     "nothing in the class",
@@ -1167,11 +1156,6 @@ nearest(
     ),
 )
 nearest("handles-missing-values", "fill or skip missing values", probabilities=without_missing)
-fitting(
-    "few-trials-are-refused-or-learned",
-    "raise ValueError, or learn from",
-    lambda labels: len(set(labels)) < 2,
-)
 fitting(
     "few-trials-are-refused-or-learned",
     "fit on one trial of each label raised",
