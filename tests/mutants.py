@@ -421,11 +421,7 @@ leaving(
 )
 commanding("commands-are-declared-and-finite", "of type int: write a float", value=3)
 commanding("commands-are-declared-and-finite", "add it to `commands`", kind=POSITION)
-commanding(
-    "commands-are-declared-and-finite",
-    "bound it",
-    value=lambda command, frame: inf if frame.t_s > 1.0 else command.value,
-)
+commanding("commands-are-declared-and-finite", "bound it", value=inf)
 commanding("commands-are-declared-and-finite", "a limit of 0 or more", effort_limit_n=nan)
 commanding(
     "same-tick-same-command", "but its arguments", value=lambda command, _: command.value + _rng.random()
@@ -700,9 +696,7 @@ framing("channels-are-those-declared", "NaN in all", edge_left_n=nan)
 framing("time-runs-forward", "each is later than the last", t_s=1.0)
 framing("time-runs-forward", "dt_s is 1 s where", dt_s=1.0)
 framing("rate-is-as-declared", "stands still", t_s=0.0)
-framing(
-    "rate-is-as-declared", "gap is new", gap_m=lambda frame: 0.07 - (round(1e3 * frame.t_s) // 3 * 3e-4) ** 2
-)
+framing("rate-is-as-declared", "gap is new", gap_m=lambda frame: (round(1e3 * frame.t_s) // 3 * 3e-4) ** 2)
 framing("squeezes-with-what-it-is-asked", "an effort that closes", effort_n=lambda frame: -frame.effort_n)
 framing("gap-is-in-metres", "divide by 1000", gap_m=lambda frame: 1000.0 * frame.gap_m)
 framing("gap-is-in-metres", "divide by 100)", gap_m=lambda frame: 100.0 * frame.gap_m)
