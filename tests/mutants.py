@@ -13,7 +13,7 @@ import time
 from dataclasses import dataclass
 from functools import partial
 from io import StringIO
-from math import inf, isnan, nan
+from math import inf, nan
 from typing import Any, NamedTuple
 
 import attrs
@@ -217,11 +217,6 @@ featuring(
 featuring(AS_DECLARED, "peak in mN", units=("mN",))
 featuring("units-are-of-the-si", "'newton'", entry={"features": NEWTON}, units=("newton",))
 featuring("a-whole-grasp-has-features", "every feature is missing", values=(nan,), reasons={"peak": "lazy"})
-measuring(
-    "returns-the-declared-features",
-    "write float(...)",
-    lambda peak, trace: peak if isnan(peak) else int(peak),
-)
 measuring("returns-the-declared-features", "of type float64", lambda peak, trace: np.float64(peak))
 measuring("same-trace-same-features", "no state between calls", lambda peak, trace: peak + next(_calls))
 measuring(
@@ -426,11 +421,7 @@ leaving(
 )
 commanding("commands-are-declared-and-finite", "of type int: write a float", value=3)
 commanding("commands-are-declared-and-finite", "add it to `commands`", kind=POSITION)
-commanding(
-    "commands-are-declared-and-finite",
-    "bound it",
-    value=lambda command, frame: inf if frame.t_s > 1.0 else command.value,
-)
+commanding("commands-are-declared-and-finite", "bound it", value=inf)
 commanding("commands-are-declared-and-finite", "a limit of 0 or more", effort_limit_n=nan)
 commanding(
     "same-tick-same-command", "but its arguments", value=lambda command, _: command.value + _rng.random()
@@ -444,12 +435,6 @@ def counting_step(params, state, reading):
 
 
 law("same-tick-same-command", "changes a global", step=staticmethod(counting_step))
-law(
-    "commands-are-declared-and-finite",
-    "makes sense in m and m/s",
-    entry={"commands": ("velocity",)},
-    step=staticmethod(lambda *given: (Command(VELOCITY, -10.0, inf, inf), step(*given)[1])),
-)
 commanding(
     "state-holds-everything",
     "nothing in the class",
@@ -711,9 +696,7 @@ framing("channels-are-those-declared", "NaN in all", edge_left_n=nan)
 framing("time-runs-forward", "each is later than the last", t_s=1.0)
 framing("time-runs-forward", "dt_s is 1 s where", dt_s=1.0)
 framing("rate-is-as-declared", "stands still", t_s=0.0)
-framing(
-    "rate-is-as-declared", "gap is new", gap_m=lambda frame: 0.07 - (round(1e3 * frame.t_s) // 3 * 3e-4) ** 2
-)
+framing("rate-is-as-declared", "gap is new", gap_m=lambda frame: (round(1e3 * frame.t_s) // 3 * 3e-4) ** 2)
 framing("squeezes-with-what-it-is-asked", "an effort that closes", effort_n=lambda frame: -frame.effort_n)
 framing("gap-is-in-metres", "divide by 1000", gap_m=lambda frame: 1000.0 * frame.gap_m)
 framing("gap-is-in-metres", "divide by 100)", gap_m=lambda frame: 100.0 * frame.gap_m)
@@ -1167,11 +1150,6 @@ nearest(
     ),
 )
 nearest("handles-missing-values", "fill or skip missing values", probabilities=without_missing)
-fitting(
-    "few-trials-are-refused-or-learned",
-    "raise ValueError, or learn from",
-    lambda labels: len(set(labels)) < 2,
-)
 fitting(
     "few-trials-are-refused-or-learned",
     "fit on one trial of each label raised",

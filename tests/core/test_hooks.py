@@ -29,11 +29,11 @@ from graspsense.core.values.trial import RunInfo
 from graspsense.experiment_api import ExperimentKindEntry
 from graspsense.plugin_api import (
     CommandEntry,
-    DatasetEntry,
     PipelineEntry,
     PluginUnavailable,
     UnknownName,
 )
+from graspsense.scaffold.make import KINDS
 from graspsense.simulator_api import collect
 from graspsense.testing.samples import a_trial
 
@@ -63,16 +63,8 @@ def raising(error: BaseException):
     return raise_it
 
 
-COMPONENTS = {
-    "graspsense_sensor_backends": ("sensor-backend", "lab-thing", "lab_thing.backend:LabThingGripper"),
-    "graspsense_controllers": ("controller", "lab-thing", "lab_thing.law:LabThingController"),
-    "graspsense_feature_sets": ("feature-set", "lab-thing", "lab_thing.features:LabThingFeatures"),
-    "graspsense_classifiers": ("classifier", "lab-thing", "lab_thing.classifier:LabThingClassifier"),
-}
-"""Hooks of components; the role, the name and the target of what its example gives."""
 RESOURCES = {
     "graspsense_models": (ModelEntry, "lab-cans", "resource", "lab_hand:models/cans.json"),
-    "graspsense_datasets": (DatasetEntry, "lab-thing", "recordings", "lab_thing.reader:recordings"),
     "graspsense_emulators": (EmulatorEntry, "lab-hand", "target", "lab_hand.emulator:emulate"),
     "graspsense_live_observers": (LiveObserverEntry, "lab-wall", "target", "lab_hand.wall:observe"),
     "graspsense_conformance_checks": (
@@ -117,7 +109,8 @@ ASKED = {
 
 
 def test_every_hook_has_a_test():
-    assert set(HOOKS) == {*COMPONENTS, *RESOURCES, *OBSERVERS, *ASKED}
+    scaffolded = {f"graspsense_{role.replace('-', '_')}s" for role, kind in KINDS.items() if kind.entry}
+    assert set(HOOKS) == {*scaffolded, *RESOURCES, *OBSERVERS, *ASKED}
 
 
 @every_case("hook", RESOURCES)
@@ -136,16 +129,6 @@ def test_an_observer_hook_is_called_with_what_it_observes(hook):
     IsolatedPlugins(module).collect(hook, **arguments)
 
     assert getattr(module, kept) == [value]
-
-
-@every_case("hook", COMPONENTS)
-def test_a_component_hook_gives_components_of_its_role(hook):
-    role, name, target = COMPONENTS[hook]
-    plugins = IsolatedPlugins(example(hook), builtins=False)
-
-    assert [(component.role, component.name) for component in plugins.components()] == [(role, name)]
-    assert plugins.find(role, name).qualified == f"graspsense-test/{name}"
-    assert plugins.find(role, name).entry.target == target
 
 
 def test_the_documented_hand_has_the_channels_of_its_fingers():

@@ -106,9 +106,7 @@ def test_another_sound_feature_set_passes_every_check(changes):
 
 def test_a_read_that_other_work_held_up_once_is_within_its_timeout():
     hand = subject("sensor-backend", parts.ENTRIES["sensor-backend"])
-    (check,) = (
-        timeout_check for timeout_check in CHECKS["sensor-backend"] if timeout_check.id == "answers-in-time"
-    )
+    (check,) = (each for each in CHECKS["sensor-backend"] if each.id == "answers-in-time")
     hand.session.longest_read_s = 1.2
 
     assert outcome_of(check, hand, {}).state == "passed"

@@ -154,8 +154,8 @@ def _sources_of(distribution: Distribution) -> list[PluginSource]:
     try:
         entry_points = distribution.entry_points.select(group=ENTRY_POINT_GROUP)
     except Exception as error:
-        refused = PluginRefused(f"its entry points cannot be read ({error}): {ENTRY_POINT}")
-        return [PluginSource(name, version, "?", "entry_points.txt", _raising(refused))]
+        reason = f"its entry points cannot be read ({error}): {ENTRY_POINT}"
+        return [PluginSource(name, version, "?", "entry_points.txt", partial(_refused, reason))]
     return [
         PluginSource(name, version, point.name, point.value, partial(_loaded, point))
         for point in entry_points
@@ -183,11 +183,8 @@ def _name_and_version(distribution: Distribution) -> tuple[str, str]:
     return canonical(metadata["Name"] or name), metadata["Version"] or version or "?"
 
 
-def _raising(error: Exception) -> Callable[[], object]:
-    def load() -> object:
-        raise error
-
-    return load
+def _refused(reason: str) -> object:
+    raise PluginRefused(reason)
 
 
 def _names(text: str) -> set[str]:
