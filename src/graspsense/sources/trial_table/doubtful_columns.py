@@ -21,18 +21,18 @@ from graspsense.core.values.errors import counted, listed
 from graspsense.sources.columns.column_guess import TIME_WORDS, words_of
 from graspsense.sources.trial_table.identifiers import (
     DIVISIONS,
+    SURE,
     TIMES,
     are_even,
     differs_by_label,
+    evenness,
     follow_lines,
     groups_of_labels,
     in_one_block_each,
     is_count,
-    is_regular,
     is_time,
     name_objects,
     names_only,
-    one_way,
 )
 
 if TYPE_CHECKING:
@@ -77,11 +77,6 @@ _NEAR: Final = 3.0
 """Standard errors by which the mean of noise is away from zero at most."""
 _ROUNDED_SUM: Final = 0.02
 """Largest error of a sum of probabilities."""
-_ENOUGH_LINES: Final = 30
-_USUAL: Final = 2.0
-"""Largest step between two labels over the median step within labels."""
-_STEADY: Final = 1.0
-"""Quartile range of the steps of what adds up over the trials, in any unit, over their median."""
 _THOUSAND: Final = 1000.0
 _GAP: Final = 100.0
 """Ratio of two neighbouring values between which the unit may change."""
@@ -105,8 +100,7 @@ _DOUBTS: Final[Mapping[str, Mapping[str, str]]] = {
         "does",
         "time": "its name is that of a time",
         "session": "it is from before the contact, or can drift in a session, by its name or unit",
-        "without a gap": "its values pass from label to label without a gap or an overlap, as those of a clock or a "
-        "counter do",
+        "even": "its values have more equal steps than measured ones, as those of a clock or of what adds up do",
     },
     "Digits tell the labels: round all values alike, or ": {
         "digits": "it is written with fewer digits for some labels than for others",
@@ -186,8 +180,8 @@ def _of_numbers(name: str, unit: str, values: Numbers, labels: Sequence[str]) ->
     state = differs and "/" not in unit and not _CHANGES & words
     if state and (_OF_A_SESSION & words or unit in ("C", "\u00b0C", "degC")):
         yield "session"
-    if passes_without_a_gap(values, labels, np.inf if of_time else _STEADY):
-        yield "without a gap"
+    if evenness(values[~np.isnan(values)]) > SURE:
+        yield "even"
     if digits_tell_labels(values, labels):
         yield "digits"
 
@@ -208,7 +202,8 @@ def _probabilities(numbers: dict[str, Numbers], labels: Sequence[str]) -> Iterat
 
 def _of_target(values: Numbers, target: Numbers) -> Iterator[str]:
     """Yield why the numbers of a column may be the number to predict itself, or when it was measured."""
-    if len(values) > 2 * LEAST_LINES and one_way(values) == 1.0:
+    steps = np.diff(values)
+    if len(steps) >= 2 * LEAST_LINES and ((steps > 0.0).all() or (steps < 0.0).all()):
         yield "rising"
     if follows_from(values, target):
         yield "target"
@@ -285,24 +280,6 @@ def values_have_one_label(values: Sequence[str] | Sequence[float], labels: Seque
         return False
     ranges = sum(1 for _ in groupby(sorted(given), key=itemgetter(1)))
     return texts or ranges > among or are_even([*different.values()], _EVEN)
-
-
-def passes_without_a_gap(values: Numbers, labels: Sequence[str], uneven: float) -> bool:
-    """Return whether each label has a range of its own, and no two ranges are farther apart than values within one.
-
-    The quartile range of the steps is less than `uneven` times their median. Two classes of normally distributed values
-    that do not overlap lie so closely in about 2 of 100 columns.
-    """
-    known = np.flatnonzero(~np.isnan(values))
-    order = known[np.argsort(values[known], kind="stable")]
-    sorted_labels = np.array(labels)[order]
-    ends = np.flatnonzero(sorted_labels[1:] != sorted_labels[:-1])
-    if len(order) < _ENOUGH_LINES or not 0 < len(ends) == len(set(labels)) - 1:
-        return False
-    steps = np.diff(values[order])
-    usual = float(np.median(np.delete(steps, ends)))
-    touching = (steps[ends] > 0.0).all() and (steps[ends] <= _USUAL * usual).all()
-    return bool(touching) and is_regular(values[order], uneven)
 
 
 def follows_from(values: Numbers, target: Numbers) -> bool:

@@ -2,8 +2,8 @@
 
 Trials are often recorded one label after the other, so that such a column reveals the labels, in whatever order the
 lines are. A measured column may be distinct in every line as well, and may increase with the labels of a sorted file;
-what distinguishes an identifier is that it follows the lines within each label, that it is a calendar date or a clock,
-or that its values lie on a grid and repeat less, or more evenly, than measured ones can.
+what distinguishes an identifier is that it follows the lines within each label, that it is a calendar date, that its
+values lie on a grid and repeat less, or more evenly, than measured ones can, or that their steps are too much alike.
 """
 
 from __future__ import annotations
@@ -64,19 +64,19 @@ _FOLLOWS: Final = 0.95
 _DRIFTS: Final = 0.7
 _DRIFTS_NEAR: Final = 0.35
 """The same of a drift with noise, and that within a few lines."""
+_SPACED: Final = 30
+"""Number of lines from which on a drift with noise shows."""
 _TIES: Final = 0.2
-_COUNTING: Final = 15
-"""Number of values from which on their order shows a counter: of random ones, one column in ten thousand does. Fewer
-number the repetitions with an object."""
+"""Share of steps against the order of a counter, and of equal values of a number of trials."""
+SURE: Final = 4.0
+"""Standard deviations from what drawn values have: of 10 000 columns, hardly a drawn one is as far from it."""
+_MAYBE: Final = 1.0
+"""The same of numbers that are in the range of a clock anyway."""
+_RATIO: Final = (2.0 * math.log(2.0) - 1.0, 0.28)
+"""Mean and standard deviation of the ratio of two exponential steps, the smaller one over the larger one."""
 _BY_CHANCE: Final = 0.005
 _ORDERS: Final = 10_000
 """Number of orders of the lines within the labels, for each of its kind, from which on an order is no chance."""
-_IRREGULAR: Final = 0.7
-"""Quartile range of the steps of a clock over their median; of sorted measurements it is 1.6 or more on average."""
-_SPACED: Final = 30
-"""Number of lines from which on steps that are alike show a clock, in whatever order the lines are."""
-_ALIKE: Final = 0.35
-"""The same ratio of a clock whose lines are in any order: of 30 measurements it is less once in a million."""
 _EVEN: Final = 1e-3
 """Probability that drawn values have numbers of lines as even as those of objects."""
 _TWO: Final = 1.9
@@ -85,15 +85,8 @@ _HASHED: Final = 1e7
 """Integers from this one on are hashes, if they number objects and are no multiples of 1000."""
 _EPOCH_S: Final = (6.3e8, 4.2e9)
 """The years 1990 to 2100 in seconds since 1970."""
-_DAY_S: Final = 86_400.0
-_CALENDARS: Final = (
-    *((1.0 / per_second, 0.0) for per_second in (1.0, 1e3, 1e6, 1e9)),
-    *((_DAY_S, day_of_1970) for day_of_1970 in (25_569.0, 40_587.0, 719_529.0, 2_440_587.5)),
-)
-"""The unit (s) of such times, and the year 1970 in it: in seconds and their parts, and in the days of spreadsheets, of
-Julian dates, modified or not, and of MATLAB."""
-_WORKING_DAY: Final = 0.7
-"""Part of the day in which all recordings were made."""
+_PARTS_OF_S: Final = (1.0, 1e3, 1e6, 1e9)
+_TWO_DAYS_S: Final = 172_800.0
 NAME_OBJECTS: Final = "name the objects (say so by --instance)"
 NUMBER_OBJECTS: Final = "number the objects (name them by --instance)"
 NAME_THINGS: Final = "name the objects, which have several labels (say so by --instance)"
@@ -175,23 +168,15 @@ def identifies(
     if on_grid and no_chance and name_objects(numbers, known):
         return NUMBER_OBJECTS
     named = bool(_NAMES & set(words_of(name)))
-    different = len(set(zip(column.tolist(), known, strict=True))) >= (1.0 - _TIES) * len(column)
     for lines in [given] if order is None else [given, np.array(order)[given]]:
-        recorded = np.argsort(lines)
-        way, in_labels = one_way(column[recorded]), _follows_in_labels(column, lines, known)
-        blocks = sum(1 for _ in groupby(known[i] for i in recorded.tolist()))
-        # A counter of a byte begins anew. So does what differs by labels that take turns.
-        turns = 2 * blocks > len(known) and differs_by_label(column, known)
-        counts = len(values_of) >= _COUNTING and way >= 1.0 - _TIES and not turns
-        follows = different and (way == 1.0 or in_labels)
-        like_clock = is_regular(values_of) or (is_time(unit) and in_labels)
-        if ((whole or named) and (counts or follows)) or (follows and like_clock):
+        if (whole or named or is_time(unit)) and rises(column, lines, known):
             return "follow the order of the lines as a counter or a time does"
+    if evenness(column) > SURE:
+        return "have equal steps, as those of a clock or a counter"
     no_ties = len(values_of) == len(column)
+    different = len(set(zip(column.tolist(), known, strict=True))) >= (1.0 - _TIES) * len(column)
     if different and (_hardly_repeats(len(column), len(values_of), cells) or (named and whole and no_ties)):
         return "number the trials"
-    if no_ties and len(column) >= _SPACED and is_regular(values_of, _ALIKE):
-        return "have equal steps, as those of a clock or a counter"
     return ""
 
 
@@ -234,10 +219,18 @@ def is_time(unit: str) -> bool:
 
 
 def _is_calendar(column: NDArray[np.float64]) -> bool:
-    """Return whether these are times since 1970, or dates written as 20261126."""
-    values = np.unique(column)
-    if 2 * len(values) > len(column) and any(_is_time_in(values, *calendar) for calendar in _CALENDARS):
-        return True
+    """Return whether these are times since 1970, or dates written as 20261126.
+
+    No two grasps are recorded within a second, and most come after another within two days. Measured numbers can be as
+    large, but their steps are not alike at all.
+    """
+    values, (low, high) = np.unique(column), _EPOCH_S
+    if 2 * len(values) > len(column) and evenness(column) > _MAYBE:
+        for times_s in (values / parts for parts in _PARTS_OF_S):
+            steps_s = np.diff(times_s)
+            within = steps_s.mean() >= 1.0 and np.median(steps_s) <= _TWO_DAYS_S
+            if low <= times_s[0] and times_s[-1] <= high and within:
+                return True
     if values[0] < 0.0 or (values != np.floor(values)).any():
         return False
     texts = [f"{value:.0f}" for value in values.tolist()]
@@ -246,20 +239,6 @@ def _is_calendar(column: NDArray[np.float64]) -> bool:
     hundreds, ends = np.unique(values // 100.0), np.unique(values % 100.0)
     many = len(hundreds) >= _CLOCK_VALUES[0] and len(ends) >= _CLOCK_VALUES[1]
     return many and values[-1] < 240_000.0 and max(ends.max(), (hundreds % 100.0).max()) < 60.0
-
-
-def _is_time_in(values: NDArray[np.float64], unit_s: float, year_1970: float) -> bool:
-    """Return whether different rising values are times in a calendar: most of them come after another within two days.
-
-    No two grasps are recorded within a second, and all that are numbered by days in a working day.
-    """
-    low, high = _EPOCH_S
-    times_s = unit_s * (values - year_1970)
-    steps_s = np.diff(times_s)
-    within = steps_s.mean() >= 1.0 and np.median(steps_s) <= 2.0 * _DAY_S
-    parts = np.unique((values - year_1970) % 1.0)
-    in_day = unit_s < _DAY_S or (2 * len(parts) > len(values) and np.ptp(parts) < _WORKING_DAY)
-    return bool(low <= times_s[0] and times_s[-1] <= high and within and in_day)
 
 
 def _is_written_date(text: str, form: str) -> bool:
@@ -271,19 +250,18 @@ def _is_written_date(text: str, form: str) -> bool:
         return False
 
 
-def one_way(values: NDArray[np.float64]) -> float:
-    """Return the share of values that are larger than the one before, or smaller, if these are more."""
-    steps = np.diff(values)
-    return float(max((steps > 0.0).mean(), (steps < 0.0).mean()))
+def rises(values: NDArray[np.float64], lines: NDArray[np.int64], labels: Sequence[str]) -> bool:
+    """Return whether nearly all steps of values from line to line of a label go the same way, which is no chance.
 
-
-def _follows_in_labels(column: NDArray[np.float64], lines: NDArray[np.int64], labels: Sequence[str]) -> bool:
-    """Return whether the values rise, or fall, with these positions within each label, which is no chance."""
+    A counter of a byte begins anew. Of values in any order, the number of steps that rise has a twelfth of the number
+    of values as its variance.
+    """
     codes = np.unique(np.array(labels), return_inverse=True)[1]
-    sizes = Counter(np.bincount(codes).tolist())
-    if sum(times * math.lgamma(size + 1) for size, times in sizes.items()) < math.log(_ORDERS):
-        return False
-    return abs(_rank_correlation(column, lines.astype(np.float64), codes)) >= _FOLLOWS
+    in_labels = np.lexsort((lines, codes))
+    steps = np.diff(values[in_labels])[np.diff(codes[in_labels]) == 0]
+    up, down = int((steps > 0.0).sum()), int((steps < 0.0).sum())
+    chance = math.sqrt((up + down + 2 * len(set(labels))) / 12.0)
+    return max(up, down) >= (1.0 - _TIES) * (up + down) and abs(up - down) >= 2.0 * SURE * chance
 
 
 def follow_lines(values: NDArray[np.float64], labels: Sequence[str]) -> bool:
@@ -294,17 +272,14 @@ def follow_lines(values: NDArray[np.float64], labels: Sequence[str]) -> bool:
     """
     given = np.flatnonzero(~np.isnan(values))
     codes = np.unique(np.array(labels)[given], return_inverse=True)[1]
-    column, lines = values[given], given.astype(np.float64)
-    if _follows_in_labels(column, given, [labels[i] for i in given.tolist()]):
-        return True
-    if len(given) < _SPACED or not np.ptp(column):
+    column, lines, counts = values[given], given.astype(np.float64), np.bincount(codes)
+    whole = abs(_rank_correlation(column, lines, codes))
+    if whole < _DRIFTS or sum(map(math.lgamma, counts + 1.0)) < math.log(_ORDERS):
         return False
-    counts = np.bincount(codes)
     within = (_ranks(lines, codes) + (counts[codes] - 1) / 2.0).astype(np.int64)
-    parts = codes * len(given) + within // LEAST_LINES
-    parts = np.unique(parts, return_inverse=True)[1]
-    whole, near = (_rank_correlation(column, lines, groups) for groups in (codes, parts))
-    return abs(whole) >= _DRIFTS and whole * near > 0.0 and abs(near) >= _DRIFTS_NEAR
+    parts = np.unique(codes * len(given) + within // LEAST_LINES, return_inverse=True)[1]
+    near = abs(_rank_correlation(column, lines, parts))
+    return whole >= _FOLLOWS or (len(given) >= _SPACED and near >= _DRIFTS_NEAR)
 
 
 def _rank_correlation(
@@ -318,12 +293,11 @@ def _rank_correlation(
 
 def _ranks(values: NDArray[np.float64], codes: NDArray[np.int64]) -> NDArray[np.float64]:
     """Return the rank of each value in its group, from the middle of the group; equal ones have their mean rank."""
-    order = np.lexsort((values, codes))
-    changes = (np.diff(codes[order]) != 0) | (np.diff(values[order]) != 0.0)
-    tie = np.concatenate([[0], np.cumsum(changes)])
-    ranks = np.empty(len(values))
-    ranks[order] = (np.bincount(tie, weights=np.arange(len(values))) / np.bincount(tie))[tie]
-    return ranks - (np.bincount(codes, weights=ranks) / np.bincount(codes))[codes]
+    pairs = np.stack([codes, values])
+    _, places, counts = np.unique(pairs, axis=1, return_inverse=True, return_counts=True)
+    ranks = (np.cumsum(counts) - (counts - 1) / 2.0)[places.ravel()]
+    means: NDArray[np.float64] = np.bincount(codes, weights=ranks) / np.bincount(codes)
+    return ranks - means[codes]
 
 
 def differs_by_label(values: NDArray[np.float64], labels: Sequence[str]) -> bool:
@@ -337,10 +311,21 @@ def differs_by_label(values: NDArray[np.float64], labels: Sequence[str]) -> bool
     return bool(np.var(values[known] - means[codes]) < 0.5 * np.var(values[known]))
 
 
-def is_regular(values: NDArray[np.float64], most: float = _IRREGULAR) -> bool:
-    """Return whether the steps between these rising values are alike, as those of a clock are."""
-    low, middle, high = np.quantile(np.diff(values), (0.25, 0.5, 0.75))
-    return bool(high - low < most * middle)
+def evenness(values: NDArray[np.float64]) -> float:
+    """Return by how many standard deviations the steps of values are more alike than those of drawn ones, in any order.
+
+    Neighbouring steps of sorted values that were drawn independently are exponential, whatever their distribution is:
+    the smaller one is 2 log 2 - 1 of the larger one on average. Those of a clock, of a counter, and of what adds up
+    over the trials are more alike. Values are spread over the cells that they were rounded to.
+    """
+    rising = np.sort(values)
+    if len(rising) < LEAST_LINES or not 0.0 < np.ptp(rising) < math.inf:
+        return 0.0
+    cell = np.ptp(rising) / cells_in_range(np.unique(rising))
+    spread = rising - rising[0] + cell * np.random.default_rng(0).random(len(rising))
+    steps = np.maximum(np.diff(np.sort(spread)), np.finfo(float).tiny)
+    ratios = np.minimum(steps[1:], steps[:-1]) / np.maximum(steps[1:], steps[:-1])
+    return float(ratios.mean() - _RATIO[0]) / _RATIO[1] * math.sqrt(len(ratios))
 
 
 def _hardly_repeats(n: int, distinct: int, cells: float) -> bool:
