@@ -66,13 +66,13 @@ UNITS: Final = frozenset((
 """What stands in a line of units, in small letters: units of the quantities above, and of others."""
 
 
-_DATES_S: Final = (946_684_800.0, 4_102_444_800.0)
+DATES_S: Final = (946_684_800.0, 4_102_444_800.0)
 """The years 2000 and 2100, in seconds since 1970."""
 
 
 def unit_since_1970(time: float) -> str:
     """Return the unit in which a number is a time of this century, empty if that is s, or if it is none."""
-    low, high = _DATES_S
+    low, high = DATES_S
     return next((unit for unit in ("ms", "us", "ns") if low <= time * TO_SI["time"][unit] < high), "")
 
 

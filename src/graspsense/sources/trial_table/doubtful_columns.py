@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Hashable, Iterator, Mapping, Sequence
-from decimal import Decimal, DecimalTuple
+from decimal import Decimal
 from itertools import chain, groupby, permutations
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any, Final
@@ -48,6 +48,7 @@ _OF_TIMES: Final = TIMES | {
 _OF_A_SESSION: Final = frozenset({
     "temperature", "temp", "humidity", "battery", "batt", "vbat", "baseline", "zero", "initial", "start", "before"
 })  # fmt: skip
+"""What can be the same, or drift, in a whole session, by the name of a column."""
 _CHANGES: Final = frozenset({
     "slope", "stiffness", "rate", "rise", "drop", "change", "delta", "cooling", "crossing", "crossings",
 })  # fmt: skip
@@ -58,7 +59,6 @@ _RESULTS: Final = frozenset({
 })  # fmt: skip
 _OF_RESULTS: Final = DIVISIONS | {"value", "val", "distance", "dist", "function", "rank"}
 """What a model or a test says, by the name of a column."""
-"""What can be the same, or drift, in a whole session, by the name of a column."""
 _OFTEN: Final = 3
 """Lines with the same value from which on it may stand for something else than a measurement."""
 _FROM_ZERO: Final = 0.15
@@ -71,8 +71,6 @@ _ROUNDED: Final = 6
 """Most digits of a number that is taken for a rounded one."""
 _MOSTLY: Final = 0.75
 """Share of the lines of each label from which on a value may be the setting that this label was recorded with."""
-_EVEN: Final = 0.005
-"""Probability that drawn values have numbers of lines as even as those of objects, below which it is told."""
 _NEAR: Final = 3.0
 """Standard errors by which the mean of noise is away from zero at most."""
 _ROUNDED_SUM: Final = 0.02
@@ -245,19 +243,18 @@ def digits_tell_labels(values: Numbers, labels: Sequence[str]) -> bool:
 
     Only digits that were rounded count, and not those of numbers of another magnitude.
     """
-    given: dict[str, list[DecimalTuple]] = {}
-    for label, value in zip(labels, values.tolist(), strict=True):
-        if value == value:
-            given.setdefault(label, []).append(Decimal(repr(value)).normalize().as_tuple())
-    places_and_digits = [
-        np.array([(-int(number.exponent), len(number.digits)) for number in numbers])
-        for numbers in given.values()
-        if len(numbers) >= LEAST_LINES and len(set(numbers)) >= _OFTEN
+    known = np.flatnonzero(~np.isnan(values))
+    written = [Decimal(repr(value)).normalize().as_tuple() for value in values[known].tolist()]
+    places_and_digits = np.array([(-int(number.exponent), len(number.digits)) for number in written])
+    rows_of = [np.flatnonzero(np.array(labels)[known] == label) for label in set(labels)]
+    judged = [
+        rows for rows in rows_of if len(rows) >= LEAST_LINES and len(np.unique(values[known][rows])) >= _OFTEN
     ]
+    pairs = permutations([places_and_digits[rows] for rows in judged], 2)
     return any(
         (coarse.max(axis=0) < np.minimum(fine.max(axis=0), (np.inf, _ROUNDED))).all()
         and float((fine[:, 0] > coarse[:, 0].max()).mean()) > 0.5
-        for coarse, fine in permutations(places_and_digits, 2)
+        for coarse, fine in pairs
     )
 
 
@@ -279,7 +276,7 @@ def values_have_one_label(values: Sequence[str] | Sequence[float], labels: Seque
     if not among < len(different) == len(set(given)):
         return False
     ranges = sum(1 for _ in groupby(sorted(given), key=itemgetter(1)))
-    return texts or ranges > among or are_even([*different.values()], _EVEN)
+    return texts or ranges > among or are_even([*different.values()])
 
 
 def follows_from(values: Numbers, target: Numbers) -> bool:

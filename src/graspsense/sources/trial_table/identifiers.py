@@ -22,6 +22,7 @@ from graspsense.core.learn.confounding import LEAST_LINES
 from graspsense.core.learn.groups import cells_in_range
 from graspsense.core.values.features import LARGEST_VALUE
 from graspsense.sources.columns.column_guess import words_of
+from graspsense.sources.units import DATES_S, TO_SI
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -76,16 +77,13 @@ _RATIO: Final = (2.0 * math.log(2.0) - 1.0, 0.28)
 """Mean and standard deviation of the ratio of two exponential steps, the smaller one over the larger one."""
 _BY_CHANCE: Final = 0.005
 _ORDERS: Final = 10_000
-"""Number of orders of the lines within the labels, for each of its kind, from which on an order is no chance."""
-_EVEN: Final = 1e-3
+"""Number of orders of the lines within the labels from which on one of them is no chance."""
+_EVEN: Final = 0.005
 """Probability that drawn values have numbers of lines as even as those of objects."""
 _TWO: Final = 1.9
 """Mean number of lines of objects that have two each, but for those at the ends."""
 _HASHED: Final = 1e7
 """Integers from this one on are hashes, if they number objects and are no multiples of 1000."""
-_EPOCH_S: Final = (6.3e8, 4.2e9)
-"""The years 1990 to 2100 in seconds since 1970."""
-_PARTS_OF_S: Final = (1.0, 1e3, 1e6, 1e9)
 _TWO_DAYS_S: Final = 172_800.0
 NAME_OBJECTS: Final = "name the objects (say so by --instance)"
 NUMBER_OBJECTS: Final = "number the objects (name them by --instance)"
@@ -224,9 +222,9 @@ def _is_calendar(column: NDArray[np.float64]) -> bool:
     No two grasps are recorded within a second, and most come after another within two days. Measured numbers can be as
     large, but their steps are not alike at all.
     """
-    values, (low, high) = np.unique(column), _EPOCH_S
+    values, (low, high) = np.unique(column), DATES_S
     if 2 * len(values) > len(column) and evenness(column) > _MAYBE:
-        for times_s in (values / parts for parts in _PARTS_OF_S):
+        for times_s in (values * TO_SI["time"][unit] for unit in ("s", "ms", "us", "ns")):
             steps_s = np.diff(times_s)
             within = steps_s.mean() >= 1.0 and np.median(steps_s) <= _TWO_DAYS_S
             if low <= times_s[0] and times_s[-1] <= high and within:
@@ -273,22 +271,15 @@ def follow_lines(values: NDArray[np.float64], labels: Sequence[str]) -> bool:
     given = np.flatnonzero(~np.isnan(values))
     codes = np.unique(np.array(labels)[given], return_inverse=True)[1]
     column, lines, counts = values[given], given.astype(np.float64), np.bincount(codes)
-    whole = abs(_rank_correlation(column, lines, codes))
-    if whole < _DRIFTS or sum(map(math.lgamma, counts + 1.0)) < math.log(_ORDERS):
+    if sum(map(math.lgamma, counts + 1.0)) < math.log(_ORDERS):
         return False
     within = (_ranks(lines, codes) + (counts[codes] - 1) / 2.0).astype(np.int64)
     parts = np.unique(codes * len(given) + within // LEAST_LINES, return_inverse=True)[1]
-    near = abs(_rank_correlation(column, lines, parts))
-    return whole >= _FOLLOWS or (len(given) >= _SPACED and near >= _DRIFTS_NEAR)
-
-
-def _rank_correlation(
-    values: NDArray[np.float64], lines: NDArray[np.float64], codes: NDArray[np.int64]
-) -> float:
-    """Return the correlation of the ranks within groups; 0 if those of one do not differ."""
-    ranks, places = _ranks(values, codes), _ranks(lines, codes)
-    scale = math.sqrt(float(ranks @ ranks) * float(places @ places))
-    return float(ranks @ places) / scale if scale > 0.0 else 0.0
+    whole, near = (
+        np.corrcoef(_ranks(column, groups), _ranks(lines, groups))[0, 1] for groups in (codes, parts)
+    )
+    drifts = abs(whole) >= _DRIFTS and near * np.sign(whole) >= _DRIFTS_NEAR
+    return bool(abs(whole) >= _FOLLOWS or (drifts and len(given) >= _SPACED))
 
 
 def _ranks(values: NDArray[np.float64], codes: NDArray[np.int64]) -> NDArray[np.float64]:
@@ -376,13 +367,13 @@ def groups_of_labels(values: Sequence[Hashable], labels: Sequence[str]) -> list[
     return [group[label] if apart else label for label in labels]
 
 
-def are_even(counts: Sequence[int], by_chance: float = _EVEN) -> bool:
+def are_even(counts: Sequence[int]) -> bool:
     """Return whether values have numbers of lines as even as those of objects, by a chi-squared test."""
     from scipy.special import gammainc
 
     mean = sum(counts) / len(counts)
     uneven = (1.0 + sum((count - mean) ** 2 for count in counts)) / mean  # to the middle of the next sum
-    return mean > _TWO and bool(gammainc(0.5 * (len(counts) - 1), 0.5 * uneven) < by_chance)
+    return mean > _TWO and bool(gammainc(0.5 * (len(counts) - 1), 0.5 * uneven) < _EVEN)
 
 
 def _enough_objects(objects: int, labels: Sequence[str]) -> bool:
