@@ -68,11 +68,13 @@ _DRIFTS_NEAR: Final = 0.35
 _SPACED: Final = 30
 """Number of lines from which on a drift with noise shows."""
 _TIES: Final = 0.2
-"""Share of steps against the order of a counter, and of equal values of a number of trials."""
+"""Share of steps against the order of a counter."""
 SURE: Final = 4.0
-"""Standard deviations from what drawn values have: of 10 000 columns, hardly a drawn one is as far from it."""
+"""Standard deviations from what drawn values have: of 10 000 columns of them, about five are as far from it."""
 _MAYBE: Final = 1.0
 """The same of numbers that are in the range of a clock anyway."""
+_REPEATED: Final = 0.02
+"""Share of repeated values above which values were rounded so much that their steps are more alike."""
 _RATIO: Final = (2.0 * math.log(2.0) - 1.0, 0.28)
 """Mean and standard deviation of the ratio of two exponential steps, the smaller one over the larger one."""
 _BY_CHANCE: Final = 0.005
@@ -172,8 +174,7 @@ def identifies(
     if evenness(column) > SURE:
         return "have equal steps, as those of a clock or a counter"
     no_ties = len(values_of) == len(column)
-    different = len(set(zip(column.tolist(), known, strict=True))) >= (1.0 - _TIES) * len(column)
-    if different and (_hardly_repeats(len(column), len(values_of), cells) or (named and whole and no_ties)):
+    if _hardly_repeats(len(column), len(values_of), cells) or (named and whole and no_ties):
         return "number the trials"
     return ""
 
@@ -194,16 +195,13 @@ def text_identifies(texts: Sequence[str], labels: Sequence[str]) -> str:
     if of_words or all(map(_DATE_TEXT.fullmatch, lower)):
         return "are dates or times"
     values, own = [text for text, _ in given], [label for _, label in given]
-    numbered = all(re.search(r"\d", text) for text in counts)
     hardly = len(counts) > max(2, len(given) * _MOST_VALUES)
+    numbered = not hardly and all(re.search(r"\d", text) for text in counts)
     for known, why in ((own, NAME_OBJECTS), (groups_of_labels(values, own), NAME_THINGS)):
         of_one_label = len(set(zip(values, known, strict=True))) == len(counts)
-        several = numbered and not hardly and _enough_objects(len(counts), known)
-        if name_objects(values, known) or (several and of_one_label):
+        if name_objects(values, known) or (numbered and of_one_label and _enough_objects(len(counts), known)):
             return why
-        if hardly:
-            return "are texts that hardly repeat, as names of trials, files and remarks do"
-    return ""
+    return "are texts that hardly repeat, as names of trials, files and remarks do" if hardly else ""
 
 
 def is_count(unit: str) -> bool:
@@ -307,14 +305,15 @@ def evenness(values: NDArray[np.float64]) -> float:
 
     Neighbouring steps of sorted values that were drawn independently are exponential, whatever their distribution is:
     the smaller one is 2 log 2 - 1 of the larger one on average. Those of a clock, of a counter, and of what adds up
-    over the trials are more alike. Values are spread over the cells that they were rounded to.
+    over the trials are more alike. Where values repeat, they are spread over the cells that they were rounded to.
     """
-    rising = np.sort(values)
-    if len(rising) < LEAST_LINES or not 0.0 < np.ptp(rising) < math.inf:
+    rising = np.unique(values)
+    if len(rising) < LEAST_LINES or not np.ptp(rising) < math.inf:
         return 0.0
-    cell = np.ptp(rising) / cells_in_range(np.unique(rising))
-    spread = rising - rising[0] + cell * np.random.default_rng(0).random(len(rising))
-    steps = np.maximum(np.diff(np.sort(spread)), np.finfo(float).tiny)
+    if len(values) - len(rising) > _REPEATED * len(values):
+        cell = np.ptp(rising) / cells_in_range(rising)
+        rising = np.sort(np.sort(values) - rising[0] + cell * np.random.default_rng(0).random(len(values)))
+    steps = np.maximum(np.diff(rising), np.finfo(float).tiny)
     ratios = np.minimum(steps[1:], steps[:-1]) / np.maximum(steps[1:], steps[:-1])
     return float(ratios.mean() - _RATIO[0]) / _RATIO[1] * math.sqrt(len(ratios))
 
@@ -323,11 +322,9 @@ def _hardly_repeats(n: int, distinct: int, cells: float) -> bool:
     """Return whether values on a grid repeat too rarely to be measured, if all its cells are as frequent."""
     from scipy.special import pdtr
 
-    ties = n - distinct
-    if ties == 0 or math.isinf(cells):
-        return bool(np.log1p(-np.arange(n) / max(cells, n)).sum() < math.log(_BY_CHANCE))
     # The number of ties is about a Poisson variable.
-    return bool(pdtr(ties, n - cells * -math.expm1(n * math.log1p(-1.0 / cells))) < _BY_CHANCE)
+    expected = n + cells * math.expm1(n * math.log1p(-1.0 / cells))
+    return bool(pdtr(n - distinct, expected) < _BY_CHANCE)
 
 
 def name_objects(values: Sequence[Hashable], labels: Sequence[str]) -> bool:
