@@ -21,6 +21,7 @@ from graspsense.core.values.errors import counted, listed
 from graspsense.sources.columns.column_guess import TIME_WORDS, words_of
 from graspsense.sources.trial_table.identifiers import (
     DIVISIONS,
+    FAIRLY,
     SURE,
     TIMES,
     are_even,
@@ -75,6 +76,9 @@ _NEAR: Final = 3.0
 """Standard errors by which the mean of noise is away from zero at most."""
 _ROUNDED_SUM: Final = 0.02
 """Largest error of a sum of probabilities."""
+_ENOUGH_LINES: Final = 30
+_USUAL: Final = 2.0
+"""Largest step between two labels over the median step."""
 _THOUSAND: Final = 1000.0
 _GAP: Final = 100.0
 """Ratio of two neighbouring values between which the unit may change."""
@@ -98,7 +102,8 @@ _DOUBTS: Final[Mapping[str, Mapping[str, str]]] = {
         "does",
         "time": "its name is that of a time",
         "session": "it is from before the contact, or can drift in a session, by its name or unit",
-        "even": "its values have more equal steps than measured ones, as those of a clock or of what adds up do",
+        "even": "its values have more equal steps than measured ones, also from label to label, as those of a clock or "
+        "of what adds up do",
     },
     "Digits tell the labels: round all values alike, or ": {
         "digits": "it is written with fewer digits for some labels than for others",
@@ -178,7 +183,7 @@ def _of_numbers(name: str, unit: str, values: Numbers, labels: Sequence[str]) ->
     state = differs and "/" not in unit and not _CHANGES & words
     if state and (_OF_A_SESSION & words or unit in ("C", "\u00b0C", "degC")):
         yield "session"
-    if evenness(values[~np.isnan(values)]) > SURE:
+    if is_clock(values, labels):
         yield "even"
     if digits_tell_labels(values, labels):
         yield "digits"
@@ -277,6 +282,19 @@ def values_have_one_label(values: Sequence[str] | Sequence[float], labels: Seque
         return False
     ranges = sum(1 for _ in groupby(sorted(given), key=itemgetter(1)))
     return texts or ranges > among or are_even([*different.values()])
+
+
+def is_clock(values: Numbers, labels: Sequence[str]) -> bool:
+    """Return whether steps of values are alike, or fairly alike and no larger from label to label than within one.
+
+    Two classes of measured values that do not overlap seldom lie so closely.
+    """
+    rising = np.argsort(values)[: len(values) - int(np.isnan(values).sum())]
+    even, own = evenness(values[rising]), np.array(labels)[rising]
+    ends, steps = own[1:] != own[:-1], np.diff(values[rising])
+    apart = len(rising) >= _ENOUGH_LINES and int(ends.sum()) == len(set(labels)) - 1 > 0
+    touching = apart and bool((steps[ends] <= _USUAL * np.median(steps)).all())
+    return even > SURE or (touching and even > FAIRLY)
 
 
 def follows_from(values: Numbers, target: Numbers) -> bool:

@@ -71,8 +71,8 @@ _TIES: Final = 0.2
 """Share of steps against the order of a counter."""
 SURE: Final = 4.0
 """Standard deviations from what drawn values have: of 10 000 columns of them, about five are as far from it."""
-_MAYBE: Final = 1.0
-"""The same of numbers that are in the range of a clock anyway."""
+FAIRLY: Final = 1.0
+"""The same of numbers that are in the range of a clock anyway, or go from label to label as those of one do."""
 _REPEATED: Final = 0.02
 """Share of repeated values above which values were rounded so much that their steps are more alike."""
 _RATIO: Final = (2.0 * math.log(2.0) - 1.0, 0.28)
@@ -221,7 +221,7 @@ def _is_calendar(column: NDArray[np.float64]) -> bool:
     large, but their steps are not alike at all.
     """
     values, (low, high) = np.unique(column), DATES_S
-    if 2 * len(values) > len(column) and evenness(column) > _MAYBE:
+    if 2 * len(values) > len(column) and evenness(column) > FAIRLY:
         for times_s in (values * TO_SI["time"][unit] for unit in ("s", "ms", "us", "ns")):
             steps_s = np.diff(times_s)
             within = steps_s.mean() >= 1.0 and np.median(steps_s) <= _TWO_DAYS_S
@@ -247,11 +247,14 @@ def _is_written_date(text: str, form: str) -> bool:
 
 
 def rises(values: NDArray[np.float64], lines: NDArray[np.int64], labels: Sequence[str]) -> bool:
-    """Return whether nearly all steps of values from line to line of a label go the same way, which is no chance.
+    """Return whether all steps of values from line to line go the same way, or nearly all within the labels.
 
-    A counter of a byte begins anew. Of values in any order, the number of steps that rise has a twelfth of the number
-    of values as its variance.
+    This is no chance. A counter of a byte begins anew. Of values in any order, the number of steps that rise has a
+    twelfth of the number of values as its variance.
     """
+    in_time = np.diff(values[np.argsort(lines)])
+    if (in_time > 0.0).all() or (in_time < 0.0).all():
+        return True
     codes = np.unique(np.array(labels), return_inverse=True)[1]
     in_labels = np.lexsort((lines, codes))
     steps = np.diff(values[in_labels])[np.diff(codes[in_labels]) == 0]
