@@ -69,6 +69,8 @@ _SPACED: Final = 30
 """Number of lines from which on a drift with noise shows."""
 _TIES: Final = 0.2
 """Share of steps against the order of a counter."""
+_COUNTING: Final = 15
+"""Number of values from which on they count the trials. Fewer number the repetitions with an object, or levels."""
 SURE: Final = 4.0
 """Standard deviations from what drawn values have: of 10 000 columns of them, about five are as far from it."""
 FAIRLY: Final = 1.0
@@ -260,7 +262,8 @@ def rises(values: NDArray[np.float64], lines: NDArray[np.int64], labels: Sequenc
     steps = np.diff(values[in_labels])[np.diff(codes[in_labels]) == 0]
     up, down = int((steps > 0.0).sum()), int((steps < 0.0).sum())
     chance = math.sqrt((up + down + 2 * len(set(labels))) / 12.0)
-    return max(up, down) >= (1.0 - _TIES) * (up + down) and abs(up - down) >= 2.0 * SURE * chance
+    one_way = max(up, down) >= (1.0 - _TIES) * (up + down) and abs(up - down) >= 2.0 * SURE * chance
+    return one_way and len(np.unique(values)) >= _COUNTING
 
 
 def follow_lines(values: NDArray[np.float64], labels: Sequence[str]) -> bool:
