@@ -29,7 +29,7 @@ COUNTERS = {
     "with gaps": np.cumsum(np.random.default_rng(0).integers(1, 9, N)),
     "with large gaps": np.cumsum(np.random.default_rng(0).integers(1, 500, N)),
     "a clock in seconds": np.cumsum(np.random.default_rng(0).normal(20.0, 3.0, N)),
-    "a clock with a pause": [12.5 * i + 3000.0 * (i >= 30) for i in range(N)],
+    "a clock with a pause": [12.5 * i + i * i % 7 + 3000.0 * (i >= 30) for i in range(N)],
     "seconds since 1970": [1.7e9 + 31.7 * i for i in range(N)],
     "milliseconds since 1970": [1_700_000_000_123 + 31_700 * i for i in range(N)],
     "dates": [20260101 + i % 28 + 100 * (i // 28) for i in range(N)],
@@ -218,7 +218,8 @@ def test_what_tells_of_the_recording_is_a_feature_only_where_it_is_asked_for(hea
 def notes_on(path, column, values, labels=LABELS, order=None):
     # So that no order shows anything, unless one is given.
     order = np.random.default_rng(6).permutation(N) if order is None else order
-    lines = [f"{labels[i]},{values[i]},{i * 7919 % 101 / 17:.4f}" for i in order]
+    noise = np.random.default_rng(12).normal(size=len(labels))
+    lines = [f"{labels[i]},{values[i]},{noise[i]:.4f}" for i in order]
     path.write_text("\n".join([f"object,{column},s", *lines]) + "\n")
     return [note for note in read_labelled(path, "object").notes if column.partition(" ")[0] in note]
 
@@ -285,7 +286,7 @@ def test_a_column_that_may_reveal_the_labels_or_drifts_is_told(doubt, tmp_path):
 
 def test_what_drifts_is_told_in_the_order_of_recording(tmp_path):
     order = np.random.default_rng(4).permutation(N)
-    lines = [f"{LABELS[i]},{ZERO[i]:.4f},{i},{i * 7919 % 101 / 17:.4f}" for i in order]
+    lines = [f"{LABELS[i]},{ZERO[i]:.4f},{i},{NOISE[i]}" for i in order]
     (tmp_path / "t.csv").write_text("\n".join(["object,kind,nr,s", *lines]) + "\n")
     notes = read_labelled(tmp_path / "t.csv", "object", order="nr").notes
     assert any("kind" in note and "order of recording" in note for note in notes)

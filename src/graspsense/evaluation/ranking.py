@@ -22,6 +22,7 @@ from graspsense.core.values.features import FeatureTable
 from graspsense.evaluation.chosen import ChosenRate, comparisons_of, rate_of_chosen
 from graspsense.evaluation.crossval import ClassifierFactory, FitRefused, cross_validate
 from graspsense.evaluation.doubt import HeldOut, SetCoverage
+from graspsense.evaluation.evaluate import notes_on
 from graspsense.evaluation.folds import (
     Folds,
     commonest,
@@ -184,7 +185,8 @@ def rank(
             for protocol, predicted in answers.predicted.items()
         }
         measured[key] = CandidateResult(right=right, training_s=answers.training_s)
-    return ranking_of(measured, headline, reference, (*reference.notes, *dict.fromkeys(notes)), folds)
+    told = (*reference.notes, *notes_on(reference, folds), *dict.fromkeys(notes))
+    return ranking_of(measured, headline, reference, told, folds)
 
 
 def ranking_of(

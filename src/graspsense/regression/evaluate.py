@@ -112,14 +112,6 @@ def held_out_predictions(
     return predicted
 
 
-def held_out_folds(labelled: Labelled, k: int, seed: int) -> Folds:
-    """Return folds of whole instances if these are known, else of trials. Raises ConfigError if there are too few."""
-    alike = [""] * len(labelled)
-    if labelled.instances is not None and len(set(labelled.instances)) > 1:
-        return instance_held_out(alike, labelled.instances, k, seed)
-    return stratified(alike, k, seed)
-
-
 @frozen(eq=False)
 class _HeldOut:
     """Predictions of held-out trials: by which protocol or control, in which folds, and of which trials."""

@@ -31,9 +31,9 @@ from graspsense.core.learn.training import training_provenance
 from graspsense.core.values.errors import ConfigError, DataDamaged, counted
 from graspsense.core.values.features import FeatureTable, misfit
 from graspsense.core.values.json_values import json_ready
-from graspsense.evaluation.folds import splits
+from graspsense.evaluation.folds import held_out, splits
 from graspsense.regression.estimators import ESTIMATORS, FittedRegression, target_of
-from graspsense.regression.evaluate import held_out_folds, held_out_predictions
+from graspsense.regression.evaluate import held_out_predictions
 from graspsense.regression.intervals import PredictionIntervals, intervals_from, intervals_of
 
 VERSION: Final = 2
@@ -151,7 +151,8 @@ def train_regression(
     target = target_of(labelled)
     values = np.array(target.values)
     try:
-        folds = held_out_folds(labelled, min(FOLDS, len(values)), seed)
+        several = labelled.instances if len(set(labelled.instances or ())) > 1 else None
+        folds = held_out([""] * len(values), several, FOLDS, seed)
         predicted = held_out_predictions(estimator, labelled.table.values, values, folds, seed)
         outside = np.empty(len(values))
         for test, others in splits(folds):

@@ -79,13 +79,13 @@ def unit_in(heading: str) -> str:
     return unit if unit.lower() in UNITS - {*WITHOUT_UNIT} and not symbol else ""
 
 
-_DATES_S: Final = (946_684_800.0, 4_102_444_800.0)
+DATES_S: Final = (946_684_800.0, 4_102_444_800.0)
 """The years 2000 and 2100, in seconds since 1970."""
 
 
 def unit_since_1970(time: float) -> str:
     """Return the unit in which a number is a time of this century, empty if that is s, or if it is none."""
-    low, high = _DATES_S
+    low, high = DATES_S
     return next((unit for unit in ("ms", "us", "ns") if low <= time * TO_SI["time"][unit] < high), "")
 
 

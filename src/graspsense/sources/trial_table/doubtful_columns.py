@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Hashable, Iterator, Mapping, Sequence
-from decimal import Decimal, DecimalTuple
+from decimal import Decimal
 from itertools import chain, groupby, permutations
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any, Final
@@ -21,18 +21,19 @@ from graspsense.core.values.errors import counted, listed
 from graspsense.sources.columns.column_guess import TIME_WORDS, words_of
 from graspsense.sources.trial_table.identifiers import (
     DIVISIONS,
+    FAIRLY,
+    SURE,
     TIMES,
     are_even,
     differs_by_label,
+    evenness,
     follow_lines,
     groups_of_labels,
     in_one_block_each,
     is_count,
-    is_regular,
     is_time,
     name_objects,
     names_only,
-    one_way,
 )
 
 if TYPE_CHECKING:
@@ -48,6 +49,7 @@ _OF_TIMES: Final = TIMES | {
 _OF_A_SESSION: Final = frozenset({
     "temperature", "temp", "humidity", "battery", "batt", "vbat", "baseline", "zero", "initial", "start", "before"
 })  # fmt: skip
+"""What can be the same, or drift, in a whole session, by the name of a column."""
 _CHANGES: Final = frozenset({
     "slope", "stiffness", "rate", "rise", "drop", "change", "delta", "cooling", "crossing", "crossings",
 })  # fmt: skip
@@ -58,7 +60,6 @@ _RESULTS: Final = frozenset({
 })  # fmt: skip
 _OF_RESULTS: Final = DIVISIONS | {"value", "val", "distance", "dist", "function", "rank"}
 """What a model or a test says, by the name of a column."""
-"""What can be the same, or drift, in a whole session, by the name of a column."""
 _OFTEN: Final = 3
 """Lines with the same value from which on it may stand for something else than a measurement."""
 _FROM_ZERO: Final = 0.15
@@ -71,17 +72,13 @@ _ROUNDED: Final = 6
 """Most digits of a number that is taken for a rounded one."""
 _MOSTLY: Final = 0.75
 """Share of the lines of each label from which on a value may be the setting that this label was recorded with."""
-_EVEN: Final = 0.005
-"""Probability that drawn values have numbers of lines as even as those of objects, below which it is told."""
 _NEAR: Final = 3.0
 """Standard errors by which the mean of noise is away from zero at most."""
 _ROUNDED_SUM: Final = 0.02
 """Largest error of a sum of probabilities."""
 _ENOUGH_LINES: Final = 30
 _USUAL: Final = 2.0
-"""Largest step between two labels over the median step within labels."""
-_STEADY: Final = 1.0
-"""Quartile range of the steps of what adds up over the trials, in any unit, over their median."""
+"""Largest step between two labels over the median step."""
 _THOUSAND: Final = 1000.0
 _GAP: Final = 100.0
 """Ratio of two neighbouring values between which the unit may change."""
@@ -105,8 +102,8 @@ _DOUBTS: Final[Mapping[str, Mapping[str, str]]] = {
         "does",
         "time": "its name is that of a time",
         "session": "it is from before the contact, or can drift in a session, by its name or unit",
-        "without a gap": "its values pass from label to label without a gap or an overlap, as those of a clock or a "
-        "counter do",
+        "even": "its values have more equal steps than measured ones, also from label to label, as those of a clock or "
+        "of what adds up do",
     },
     "Digits tell the labels: round all values alike, or ": {
         "digits": "it is written with fewer digits for some labels than for others",
@@ -186,8 +183,8 @@ def _of_numbers(name: str, unit: str, values: Numbers, labels: Sequence[str]) ->
     state = differs and "/" not in unit and not _CHANGES & words
     if state and (_OF_A_SESSION & words or unit in ("C", "\u00b0C", "degC")):
         yield "session"
-    if passes_without_a_gap(values, labels, np.inf if of_time else _STEADY):
-        yield "without a gap"
+    if is_clock(values, labels):
+        yield "even"
     if digits_tell_labels(values, labels):
         yield "digits"
 
@@ -208,7 +205,8 @@ def _probabilities(numbers: dict[str, Numbers], labels: Sequence[str]) -> Iterat
 
 def _of_target(values: Numbers, target: Numbers) -> Iterator[str]:
     """Yield why the numbers of a column may be the number to predict itself, or when it was measured."""
-    if len(values) > 2 * LEAST_LINES and one_way(values) == 1.0:
+    steps = np.diff(values)
+    if len(steps) >= 2 * LEAST_LINES and ((steps > 0.0).all() or (steps < 0.0).all()):
         yield "rising"
     if follows_from(values, target):
         yield "target"
@@ -250,19 +248,18 @@ def digits_tell_labels(values: Numbers, labels: Sequence[str]) -> bool:
 
     Only digits that were rounded count, and not those of numbers of another magnitude.
     """
-    given: dict[str, list[DecimalTuple]] = {}
-    for label, value in zip(labels, values.tolist(), strict=True):
-        if value == value:
-            given.setdefault(label, []).append(Decimal(repr(value)).normalize().as_tuple())
-    places_and_digits = [
-        np.array([(-int(number.exponent), len(number.digits)) for number in numbers])
-        for numbers in given.values()
-        if len(numbers) >= LEAST_LINES and len(set(numbers)) >= _OFTEN
+    known = np.flatnonzero(~np.isnan(values))
+    written = [Decimal(repr(value)).normalize().as_tuple() for value in values[known].tolist()]
+    places_and_digits = np.array([(-int(number.exponent), len(number.digits)) for number in written])
+    rows_of = [np.flatnonzero(np.array(labels)[known] == label) for label in set(labels)]
+    judged = [
+        rows for rows in rows_of if len(rows) >= LEAST_LINES and len(np.unique(values[known][rows])) >= _OFTEN
     ]
+    pairs = permutations([places_and_digits[rows] for rows in judged], 2)
     return any(
         (coarse.max(axis=0) < np.minimum(fine.max(axis=0), (np.inf, _ROUNDED))).all()
         and float((fine[:, 0] > coarse[:, 0].max()).mean()) > 0.5
-        for coarse, fine in permutations(places_and_digits, 2)
+        for coarse, fine in pairs
     )
 
 
@@ -284,25 +281,20 @@ def values_have_one_label(values: Sequence[str] | Sequence[float], labels: Seque
     if not among < len(different) == len(set(given)):
         return False
     ranges = sum(1 for _ in groupby(sorted(given), key=itemgetter(1)))
-    return texts or ranges > among or are_even([*different.values()], _EVEN)
+    return texts or ranges > among or are_even([*different.values()])
 
 
-def passes_without_a_gap(values: Numbers, labels: Sequence[str], uneven: float) -> bool:
-    """Return whether each label has a range of its own, and no two ranges are farther apart than values within one.
+def is_clock(values: Numbers, labels: Sequence[str]) -> bool:
+    """Return whether steps of values are alike, or fairly alike and no larger from label to label than within one.
 
-    The quartile range of the steps is less than `uneven` times their median. Two classes of normally distributed values
-    that do not overlap lie so closely in about 2 of 100 columns.
+    Two classes of measured values that do not overlap seldom lie so closely.
     """
-    known = np.flatnonzero(~np.isnan(values))
-    order = known[np.argsort(values[known], kind="stable")]
-    sorted_labels = np.array(labels)[order]
-    ends = np.flatnonzero(sorted_labels[1:] != sorted_labels[:-1])
-    if len(order) < _ENOUGH_LINES or not 0 < len(ends) == len(set(labels)) - 1:
-        return False
-    steps = np.diff(values[order])
-    usual = float(np.median(np.delete(steps, ends)))
-    touching = (steps[ends] > 0.0).all() and (steps[ends] <= _USUAL * usual).all()
-    return bool(touching) and is_regular(values[order], uneven)
+    rising = np.argsort(values)[: len(values) - int(np.isnan(values).sum())]
+    even, own = evenness(values[rising]), np.array(labels)[rising]
+    ends, steps = own[1:] != own[:-1], np.diff(values[rising])
+    apart = len(rising) >= _ENOUGH_LINES and int(ends.sum()) == len(set(labels)) - 1 > 0
+    touching = apart and bool((steps[ends] <= _USUAL * np.median(steps)).all())
+    return even > SURE or (touching and even > FAIRLY)
 
 
 def follows_from(values: Numbers, target: Numbers) -> bool:

@@ -2,8 +2,8 @@
 
 Trials are often recorded one label after the other, so that such a column reveals the labels, in whatever order the
 lines are. A measured column may be distinct in every line as well, and may increase with the labels of a sorted file;
-what distinguishes an identifier is that it follows the lines within each label, that it is a calendar date or a clock,
-or that its values lie on a grid and repeat less, or more evenly, than measured ones can.
+what distinguishes an identifier is that it follows the lines within each label, that it is a calendar date, that its
+values lie on a grid and repeat less, or more evenly, than measured ones can, or that their steps are too much alike.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from graspsense.core.learn.confounding import LEAST_LINES
 from graspsense.core.learn.groups import cells_in_range
 from graspsense.core.values.features import LARGEST_VALUE
 from graspsense.sources.columns.column_guess import words_of
+from graspsense.sources.units import DATES_S, TO_SI
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -64,36 +65,30 @@ _FOLLOWS: Final = 0.95
 _DRIFTS: Final = 0.7
 _DRIFTS_NEAR: Final = 0.35
 """The same of a drift with noise, and that within a few lines."""
+_SPACED: Final = 30
+"""Number of lines from which on a drift with noise shows."""
 _TIES: Final = 0.2
+"""Share of steps against the order of a counter."""
 _COUNTING: Final = 15
-"""Number of values from which on their order shows a counter: of random ones, one column in ten thousand does. Fewer
-number the repetitions with an object."""
+"""Number of values from which on they count the trials. Fewer number the repetitions with an object, or levels."""
+SURE: Final = 4.0
+"""Standard deviations from what drawn values have: of 10 000 columns of them, about five are as far from it."""
+FAIRLY: Final = 1.0
+"""The same of numbers that are in the range of a clock anyway, or go from label to label as those of one do."""
+_REPEATED: Final = 0.02
+"""Share of repeated values above which values were rounded so much that their steps are more alike."""
+_RATIO: Final = (2.0 * math.log(2.0) - 1.0, 0.28)
+"""Mean and standard deviation of the ratio of two exponential steps, the smaller one over the larger one."""
 _BY_CHANCE: Final = 0.005
 _ORDERS: Final = 10_000
-"""Number of orders of the lines within the labels, for each of its kind, from which on an order is no chance."""
-_IRREGULAR: Final = 0.7
-"""Quartile range of the steps of a clock over their median; of sorted measurements it is 1.6 or more on average."""
-_SPACED: Final = 30
-"""Number of lines from which on steps that are alike show a clock, in whatever order the lines are."""
-_ALIKE: Final = 0.35
-"""The same ratio of a clock whose lines are in any order: of 30 measurements it is less once in a million."""
-_EVEN: Final = 1e-3
+"""Number of orders of the lines within the labels from which on one of them is no chance."""
+_EVEN: Final = 0.005
 """Probability that drawn values have numbers of lines as even as those of objects."""
 _TWO: Final = 1.9
 """Mean number of lines of objects that have two each, but for those at the ends."""
 _HASHED: Final = 1e7
 """Integers from this one on are hashes, if they number objects and are no multiples of 1000."""
-_EPOCH_S: Final = (6.3e8, 4.2e9)
-"""The years 1990 to 2100 in seconds since 1970."""
-_DAY_S: Final = 86_400.0
-_CALENDARS: Final = (
-    *((1.0 / per_second, 0.0) for per_second in (1.0, 1e3, 1e6, 1e9)),
-    *((_DAY_S, day_of_1970) for day_of_1970 in (25_569.0, 40_587.0, 719_529.0, 2_440_587.5)),
-)
-"""The unit (s) of such times, and the year 1970 in it: in seconds and their parts, and in the days of spreadsheets, of
-Julian dates, modified or not, and of MATLAB."""
-_WORKING_DAY: Final = 0.7
-"""Part of the day in which all recordings were made."""
+_TWO_DAYS_S: Final = 172_800.0
 NAME_OBJECTS: Final = "name the objects (say so by --instance)"
 NUMBER_OBJECTS: Final = "number the objects (name them by --instance)"
 NAME_THINGS: Final = "name the objects, which have several labels (say so by --instance)"
@@ -175,23 +170,14 @@ def identifies(
     if on_grid and no_chance and name_objects(numbers, known):
         return NUMBER_OBJECTS
     named = bool(_NAMES & set(words_of(name)))
-    different = len(set(zip(column.tolist(), known, strict=True))) >= (1.0 - _TIES) * len(column)
     for lines in [given] if order is None else [given, np.array(order)[given]]:
-        recorded = np.argsort(lines)
-        way, in_labels = one_way(column[recorded]), _follows_in_labels(column, lines, known)
-        blocks = sum(1 for _ in groupby(known[i] for i in recorded.tolist()))
-        # A counter of a byte begins anew. So does what differs by labels that take turns.
-        turns = 2 * blocks > len(known) and differs_by_label(column, known)
-        counts = len(values_of) >= _COUNTING and way >= 1.0 - _TIES and not turns
-        follows = different and (way == 1.0 or in_labels)
-        like_clock = is_regular(values_of) or (is_time(unit) and in_labels)
-        if ((whole or named) and (counts or follows)) or (follows and like_clock):
+        if (whole or named or is_time(unit)) and rises(column, lines, known):
             return "follow the order of the lines as a counter or a time does"
-    no_ties = len(values_of) == len(column)
-    if different and (_hardly_repeats(len(column), len(values_of), cells) or (named and whole and no_ties)):
-        return "number the trials"
-    if no_ties and len(column) >= _SPACED and is_regular(values_of, _ALIKE):
+    if evenness(column) > SURE:
         return "have equal steps, as those of a clock or a counter"
+    no_ties = len(values_of) == len(column)
+    if _hardly_repeats(len(column), len(values_of), cells) or (named and whole and no_ties):
+        return "number the trials"
     return ""
 
 
@@ -211,16 +197,13 @@ def text_identifies(texts: Sequence[str], labels: Sequence[str]) -> str:
     if of_words or all(map(_DATE_TEXT.fullmatch, lower)):
         return "are dates or times"
     values, own = [text for text, _ in given], [label for _, label in given]
-    numbered = all(re.search(r"\d", text) for text in counts)
     hardly = len(counts) > max(2, len(given) * _MOST_VALUES)
+    numbered = not hardly and all(re.search(r"\d", text) for text in counts)
     for known, why in ((own, NAME_OBJECTS), (groups_of_labels(values, own), NAME_THINGS)):
         of_one_label = len(set(zip(values, known, strict=True))) == len(counts)
-        several = numbered and not hardly and _enough_objects(len(counts), known)
-        if name_objects(values, known) or (several and of_one_label):
+        if name_objects(values, known) or (numbered and of_one_label and _enough_objects(len(counts), known)):
             return why
-        if hardly:
-            return "are texts that hardly repeat, as names of trials, files and remarks do"
-    return ""
+    return "are texts that hardly repeat, as names of trials, files and remarks do" if hardly else ""
 
 
 def is_count(unit: str) -> bool:
@@ -234,10 +217,18 @@ def is_time(unit: str) -> bool:
 
 
 def _is_calendar(column: NDArray[np.float64]) -> bool:
-    """Return whether these are times since 1970, or dates written as 20261126."""
-    values = np.unique(column)
-    if 2 * len(values) > len(column) and any(_is_time_in(values, *calendar) for calendar in _CALENDARS):
-        return True
+    """Return whether these are times since 1970, or dates written as 20261126.
+
+    No two grasps are recorded within a second, and most come after another within two days. Measured numbers can be as
+    large, but their steps are not alike at all.
+    """
+    values, (low, high) = np.unique(column), DATES_S
+    if 2 * len(values) > len(column) and evenness(column) > FAIRLY:
+        for times_s in (values * TO_SI["time"][unit] for unit in ("s", "ms", "us", "ns")):
+            steps_s = np.diff(times_s)
+            within = steps_s.mean() >= 1.0 and np.median(steps_s) <= _TWO_DAYS_S
+            if low <= times_s[0] and times_s[-1] <= high and within:
+                return True
     if values[0] < 0.0 or (values != np.floor(values)).any():
         return False
     texts = [f"{value:.0f}" for value in values.tolist()]
@@ -246,20 +237,6 @@ def _is_calendar(column: NDArray[np.float64]) -> bool:
     hundreds, ends = np.unique(values // 100.0), np.unique(values % 100.0)
     many = len(hundreds) >= _CLOCK_VALUES[0] and len(ends) >= _CLOCK_VALUES[1]
     return many and values[-1] < 240_000.0 and max(ends.max(), (hundreds % 100.0).max()) < 60.0
-
-
-def _is_time_in(values: NDArray[np.float64], unit_s: float, year_1970: float) -> bool:
-    """Return whether different rising values are times in a calendar: most of them come after another within two days.
-
-    No two grasps are recorded within a second, and all that are numbered by days in a working day.
-    """
-    low, high = _EPOCH_S
-    times_s = unit_s * (values - year_1970)
-    steps_s = np.diff(times_s)
-    within = steps_s.mean() >= 1.0 and np.median(steps_s) <= 2.0 * _DAY_S
-    parts = np.unique((values - year_1970) % 1.0)
-    in_day = unit_s < _DAY_S or (2 * len(parts) > len(values) and np.ptp(parts) < _WORKING_DAY)
-    return bool(low <= times_s[0] and times_s[-1] <= high and within and in_day)
 
 
 def _is_written_date(text: str, form: str) -> bool:
@@ -271,19 +248,22 @@ def _is_written_date(text: str, form: str) -> bool:
         return False
 
 
-def one_way(values: NDArray[np.float64]) -> float:
-    """Return the share of values that are larger than the one before, or smaller, if these are more."""
-    steps = np.diff(values)
-    return float(max((steps > 0.0).mean(), (steps < 0.0).mean()))
+def rises(values: NDArray[np.float64], lines: NDArray[np.int64], labels: Sequence[str]) -> bool:
+    """Return whether all steps of values from line to line go the same way, or nearly all within the labels.
 
-
-def _follows_in_labels(column: NDArray[np.float64], lines: NDArray[np.int64], labels: Sequence[str]) -> bool:
-    """Return whether the values rise, or fall, with these positions within each label, which is no chance."""
+    This is no chance. A counter of a byte begins anew. Of values in any order, the number of steps that rise has a
+    twelfth of the number of values as its variance.
+    """
+    in_time = np.diff(values[np.argsort(lines)])
+    if (in_time > 0.0).all() or (in_time < 0.0).all():
+        return True
     codes = np.unique(np.array(labels), return_inverse=True)[1]
-    sizes = Counter(np.bincount(codes).tolist())
-    if sum(times * math.lgamma(size + 1) for size, times in sizes.items()) < math.log(_ORDERS):
-        return False
-    return abs(_rank_correlation(column, lines.astype(np.float64), codes)) >= _FOLLOWS
+    in_labels = np.lexsort((lines, codes))
+    steps = np.diff(values[in_labels])[np.diff(codes[in_labels]) == 0]
+    up, down = int((steps > 0.0).sum()), int((steps < 0.0).sum())
+    chance = math.sqrt((up + down + 2 * len(set(labels))) / 12.0)
+    one_way = max(up, down) >= (1.0 - _TIES) * (up + down) and abs(up - down) >= 2.0 * SURE * chance
+    return one_way and len(np.unique(values)) >= _COUNTING
 
 
 def follow_lines(values: NDArray[np.float64], labels: Sequence[str]) -> bool:
@@ -294,36 +274,25 @@ def follow_lines(values: NDArray[np.float64], labels: Sequence[str]) -> bool:
     """
     given = np.flatnonzero(~np.isnan(values))
     codes = np.unique(np.array(labels)[given], return_inverse=True)[1]
-    column, lines = values[given], given.astype(np.float64)
-    if _follows_in_labels(column, given, [labels[i] for i in given.tolist()]):
-        return True
-    if len(given) < _SPACED or not np.ptp(column):
+    column, lines, counts = values[given], given.astype(np.float64), np.bincount(codes)
+    if sum(map(math.lgamma, counts + 1.0)) < math.log(_ORDERS):
         return False
-    counts = np.bincount(codes)
     within = (_ranks(lines, codes) + (counts[codes] - 1) / 2.0).astype(np.int64)
-    parts = codes * len(given) + within // LEAST_LINES
-    parts = np.unique(parts, return_inverse=True)[1]
-    whole, near = (_rank_correlation(column, lines, groups) for groups in (codes, parts))
-    return abs(whole) >= _DRIFTS and whole * near > 0.0 and abs(near) >= _DRIFTS_NEAR
-
-
-def _rank_correlation(
-    values: NDArray[np.float64], lines: NDArray[np.float64], codes: NDArray[np.int64]
-) -> float:
-    """Return the correlation of the ranks within groups; 0 if those of one do not differ."""
-    ranks, places = _ranks(values, codes), _ranks(lines, codes)
-    scale = math.sqrt(float(ranks @ ranks) * float(places @ places))
-    return float(ranks @ places) / scale if scale > 0.0 else 0.0
+    parts = np.unique(codes * len(given) + within // LEAST_LINES, return_inverse=True)[1]
+    whole, near = (
+        np.corrcoef(_ranks(column, groups), _ranks(lines, groups))[0, 1] for groups in (codes, parts)
+    )
+    drifts = abs(whole) >= _DRIFTS and near * np.sign(whole) >= _DRIFTS_NEAR
+    return bool(abs(whole) >= _FOLLOWS or (drifts and len(given) >= _SPACED))
 
 
 def _ranks(values: NDArray[np.float64], codes: NDArray[np.int64]) -> NDArray[np.float64]:
     """Return the rank of each value in its group, from the middle of the group; equal ones have their mean rank."""
-    order = np.lexsort((values, codes))
-    changes = (np.diff(codes[order]) != 0) | (np.diff(values[order]) != 0.0)
-    tie = np.concatenate([[0], np.cumsum(changes)])
-    ranks = np.empty(len(values))
-    ranks[order] = (np.bincount(tie, weights=np.arange(len(values))) / np.bincount(tie))[tie]
-    return ranks - (np.bincount(codes, weights=ranks) / np.bincount(codes))[codes]
+    pairs = np.stack([codes, values])
+    _, places, counts = np.unique(pairs, axis=1, return_inverse=True, return_counts=True)
+    ranks = (np.cumsum(counts) - (counts - 1) / 2.0)[places.ravel()]
+    means: NDArray[np.float64] = np.bincount(codes, weights=ranks) / np.bincount(codes)
+    return ranks - means[codes]
 
 
 def differs_by_label(values: NDArray[np.float64], labels: Sequence[str]) -> bool:
@@ -337,21 +306,31 @@ def differs_by_label(values: NDArray[np.float64], labels: Sequence[str]) -> bool
     return bool(np.var(values[known] - means[codes]) < 0.5 * np.var(values[known]))
 
 
-def is_regular(values: NDArray[np.float64], most: float = _IRREGULAR) -> bool:
-    """Return whether the steps between these rising values are alike, as those of a clock are."""
-    low, middle, high = np.quantile(np.diff(values), (0.25, 0.5, 0.75))
-    return bool(high - low < most * middle)
+def evenness(values: NDArray[np.float64]) -> float:
+    """Return by how many standard deviations the steps of values are more alike than those of drawn ones, in any order.
+
+    Neighbouring steps of sorted values that were drawn independently are exponential, whatever their distribution is:
+    the smaller one is 2 log 2 - 1 of the larger one on average. Those of a clock, of a counter, and of what adds up
+    over the trials are more alike. Where values repeat, they are spread over the cells that they were rounded to.
+    """
+    rising = np.unique(values)
+    if len(rising) < LEAST_LINES or not np.ptp(rising) < math.inf:
+        return 0.0
+    if len(values) - len(rising) > _REPEATED * len(values):
+        cell = np.ptp(rising) / cells_in_range(rising)
+        rising = np.sort(np.sort(values) - rising[0] + cell * np.random.default_rng(0).random(len(values)))
+    steps = np.maximum(np.diff(rising), np.finfo(float).tiny)
+    ratios = np.minimum(steps[1:], steps[:-1]) / np.maximum(steps[1:], steps[:-1])
+    return float(ratios.mean() - _RATIO[0]) / _RATIO[1] * math.sqrt(len(ratios))
 
 
 def _hardly_repeats(n: int, distinct: int, cells: float) -> bool:
     """Return whether values on a grid repeat too rarely to be measured, if all its cells are as frequent."""
     from scipy.special import pdtr
 
-    ties = n - distinct
-    if ties == 0 or math.isinf(cells):
-        return bool(np.log1p(-np.arange(n) / max(cells, n)).sum() < math.log(_BY_CHANCE))
     # The number of ties is about a Poisson variable.
-    return bool(pdtr(ties, n - cells * -math.expm1(n * math.log1p(-1.0 / cells))) < _BY_CHANCE)
+    expected = n + cells * math.expm1(n * math.log1p(-1.0 / cells))
+    return bool(pdtr(n - distinct, expected) < _BY_CHANCE)
 
 
 def name_objects(values: Sequence[Hashable], labels: Sequence[str]) -> bool:
@@ -391,13 +370,13 @@ def groups_of_labels(values: Sequence[Hashable], labels: Sequence[str]) -> list[
     return [group[label] if apart else label for label in labels]
 
 
-def are_even(counts: Sequence[int], by_chance: float = _EVEN) -> bool:
+def are_even(counts: Sequence[int]) -> bool:
     """Return whether values have numbers of lines as even as those of objects, by a chi-squared test."""
     from scipy.special import gammainc
 
     mean = sum(counts) / len(counts)
     uneven = (1.0 + sum((count - mean) ** 2 for count in counts)) / mean  # to the middle of the next sum
-    return mean > _TWO and bool(gammainc(0.5 * (len(counts) - 1), 0.5 * uneven) < by_chance)
+    return mean > _TWO and bool(gammainc(0.5 * (len(counts) - 1), 0.5 * uneven) < _EVEN)
 
 
 def _enough_objects(objects: int, labels: Sequence[str]) -> bool:
