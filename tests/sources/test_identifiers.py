@@ -218,8 +218,7 @@ def test_what_tells_of_the_recording_is_a_feature_only_where_it_is_asked_for(hea
 def notes_on(path, column, values, labels=LABELS, order=None):
     # So that no order shows anything, unless one is given.
     order = np.random.default_rng(6).permutation(N) if order is None else order
-    noise = np.random.default_rng(12).normal(size=len(labels))
-    lines = [f"{labels[i]},{values[i]},{noise[i]:.4f}" for i in order]
+    lines = [f"{labels[i]},{values[i]},{np.random.default_rng(i).normal():.4f}" for i in order]
     path.write_text("\n".join([f"object,{column},s", *lines]) + "\n")
     return [note for note in read_labelled(path, "object").notes if column.partition(" ")[0] in note]
 
