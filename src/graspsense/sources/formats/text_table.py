@@ -140,9 +140,9 @@ def read_lines(path: Path, start: str = "") -> tuple[list[Line], bool]:
     if too_many := CELLS.exceeded(text.count("\n") + text.count("\r")):
         raise DataDamaged(f"{path}: {too_many}")
     lines = list(enumerate(re.split("\r\n|[\r\n]", text), 1))
-    for number, line in lines:
-        if too_long := LINE_CHARACTERS.exceeded(len(line)):
-            raise DataDamaged(f"{path}, line {number}: {too_long}")
+    number, longest = max(lines, key=lambda line: len(line[1]))
+    if too_long := LINE_CHARACTERS.exceeded(len(longest)):
+        raise DataDamaged(f"{path}, line {number}: {too_long}")
     return lines, not text or text.endswith(("\n", "\r"))
 
 
@@ -158,8 +158,7 @@ def table_of(path: Path, lines: Sequence[Line], *, ended: bool = True) -> TextTa
 
 def text_suffix(path: Path) -> str:
     """Return the ending of a name in small letters, without that of a compression."""
-    name = path.name.lower().removesuffix(GZIP)
-    return Path(name).suffix
+    return Path(path.name.lower().removesuffix(GZIP)).suffix
 
 
 class _Layout:
@@ -180,7 +179,8 @@ class _Layout:
             plain = [(number, _APOSTROPHE.sub('"', line)) for number, line in plain]
         self.separator = given[1] if given else _separator([line for _, line in _sample(plain)])
         if not ended and plain and sum(line.count('"') for _, line in plain) % 2:
-            self._tell_cut(plain.pop()[0])
+            self.notes.append(f"line {plain.pop()[0]} is cut off, and left out")
+            self.ended = True
         plain = self._without_remarks(plain)
         self.numbered = {number for number, line in plain if _QUOTED_NUMBER.match(line)}
         self.blank: list[int] = []
@@ -220,21 +220,18 @@ class _Layout:
     def _without_remarks(self, lines: list[Line]) -> list[Line]:
         """Return the lines without the comments that some have behind their cells."""
         begins = {number: match.start() for number, line in lines if (match := _REMARK.search(line))}
-        if not 0 < 2 * len(begins) < len(lines):
-            return lines
-        others = (_split(line, self.separator) for number, line in lines if number not in begins)
-        ends = {cells[-1] for cells in others if cells}
         width, _ = _width([line for _, line in _sample(lines)], self.separator)
+        ends = {
+            line.rpartition(self.separator)[2].strip(' "') for number, line in lines if number not in begins
+        }
         shorter: dict[int, str] = {}
-        for number, line in lines:
-            text = line[: begins.get(number)].rstrip(f"{self.separator} ")
-            cells = _split(text, self.separator) if number in begins else []
-            if len(cells) == width and (
-                len(_split(line, self.separator)) != width or is_number(cells[-1]) or cells[-1] in ends
-            ):
+        for number, line in lines if 2 * len(begins) < len(lines) else ():
+            text = line[: begins.get(number, 0)].rstrip(f"{self.separator} ")
+            cells = _split(text, self.separator)
+            if len(cells) == width and (is_number(cells[-1]) or cells[-1] in ends):
                 shorter[number] = text
         self._tell(shorter, "line with a comment behind its cells")
-        return [(number, shorter.get(number, line)) for number, line in lines]
+        return [(number, shorter.get(number, line)) for number, line in lines] if shorter else lines
 
     def _rows(self, lines: Sequence[Line]) -> list[Row]:
         """Return the cells of each line that is not empty, without the last columns that none has.
@@ -338,9 +335,8 @@ class _Layout:
             return None
         names = (above_units or able)[-1]
         line, row = self.rows[names]
-        beside = head[names + 1] if above_units else None
-        if names and not above_units and len(head[names - 1]) == width and _are_units(head[names - 1]):
-            beside = head[names - 1]
+        near = head[names + 1] if above_units else head[names - 1] if names else []
+        beside = near if above_units or (len(near) == width and _are_units(near)) else None
         kinds = beside is not None and _are_kinds(beside, followed=names + 2 < data)
         plain = {number for number, _ in self.rows[:names]} - {number for number, _ in self.comments}
         if skipped := [number for number, row in self.rows[:names] if number in plain and row is not beside]:
@@ -353,8 +349,8 @@ class _Layout:
                 )
             self.notes.append(f"the names of the columns are those of line {line}")
             self._tell(skipped, "line before them")
-        if kinds:
-            self._tell((number for number, row in self.rows if row == beside), "line on the kinds of columns")
+        again = (number for number, row in self.rows if kinds and row == beside)
+        self._tell(again, "line on the kinds of columns")
         return _Header(row, None if kinds else beside, data if above_units else names + 1, line, beside)
 
     def _without_names(self, data: int, width: int) -> _Header:
@@ -362,11 +358,8 @@ class _Layout:
         line, top = self.rows[data]
         ordinals = [*map(str, range(width))]
         if data == 0 and width > 2 and top in (ordinals, ["", *ordinals[:-1]]):
-            self._tell([line], "line with numbers of the columns")
             data = 1
-        elif (data == 1 and _are_numbers(self.rows[0][1])) or all(
-            len(row) == 1 for _, row in self.rows[:data]
-        ):
+        if (data == 1 and _are_numbers(self.rows[0][1])) or all(len(row) == 1 for _, row in self.rows[:data]):
             self._tell([number for number, _ in self.rows[:data]], "line before the numbers without names")
         else:
             raise DataDamaged(
@@ -432,11 +425,6 @@ class _Layout:
         several = what.replace("line ", "lines ", 1) if what.startswith("line ") else f"{what}s"
         self.notes += [f"left out: {counted(len(lines), what, several)} (line {some})"] if lines else []
 
-    def _tell_cut(self, number: int) -> None:
-        """Note that the last line is not whole."""
-        self.notes.append(f"line {number} is cut off, and left out")
-        self.ended = True
-
     def _without_repeats(
         self, rows: list[Row], names: Sequence[str], beside: Sequence[str] | None
     ) -> list[Row]:
@@ -488,7 +476,7 @@ class _Layout:
         # An empty last cell may be a missing value, as in other rows.
         if len(last) == width and (last[-1] or not all(ends)) and not shorter:
             return rows
-        self._tell_cut(number)
+        self.notes.append(f"line {number} is cut off, and left out")
         return rows[:-1]
 
 
