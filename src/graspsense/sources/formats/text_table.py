@@ -65,8 +65,6 @@ _KIND: Final = re.compile(
 )
 """The kind of a column in a line below the names, as Orange and other programs write it, in small letters."""
 _SEPARATOR_LINE: Final = re.compile(r'"?sep=([;,\t|])"?\s*')
-_WHOLE_LINES: Final = (re.compile(r"\s*\|.*\|\s*"), re.compile(r'\s*"(?:[^"]|"")*"\s*'))
-"""Lines in bars, as of Markdown, and in quotes, as a spreadsheet saves what it has not divided."""
 _APOSTROPHES: Final = re.compile(r"[;,\t|]? *'[^']*' *(?:[;,\t|] *'[^']*' *)+[;,\t|]?")
 """Names in apostrophes in place of quotes."""
 _APOSTROPHE: Final = re.compile(r"(?<![^;,\t|])'|'(?![^;,\t|])")
@@ -120,14 +118,13 @@ class TextTable:
 
 
 class _Header(NamedTuple):
-    """The names of the columns in a line (0: none), cells of units if there are any, and the first row behind both."""
+    """The names in a line (0: none), units if any, the first row behind, and the row beside with units or kinds."""
 
     names: list[str]
     units: list[str] | None
     begin: int
     line: int
     beside: list[str] | None = None
-    """The row beside the names that has units or the kinds of the columns."""
 
 
 def read_lines(path: Path, start: str = "") -> tuple[list[Line], bool]:
@@ -172,15 +169,11 @@ class _Layout:
         if given:
             written = written[1:]
         self.comments, plain = _comments_and_others(written)
-        for whole in _WHOLE_LINES:
-            if all(whole.fullmatch(line) for _, line in plain):
-                plain = [(number, line.strip()[1:-1].replace('""', '"')) for number, line in plain]
+        if all(re.fullmatch(r"\s*\|.*\|\s*", line) for _, line in plain):
+            plain = [(number, line.strip()[1:-1]) for number, line in plain]
         if any(_APOSTROPHES.fullmatch(line) for _, line in plain[:_FEW_BEFORE]):
             plain = [(number, _APOSTROPHE.sub('"', line)) for number, line in plain]
         self.separator = given[1] if given else _separator([line for _, line in _sample(plain)])
-        if not ended and plain and sum(line.count('"') for _, line in plain) % 2:
-            self.notes.append(f"line {plain.pop()[0]} is cut off, and left out")
-            self.ended = True
         plain = self._without_remarks(plain)
         self.numbered = {number for number, line in plain if _QUOTED_NUMBER.match(line)}
         self.blank: list[int] = []
@@ -299,17 +292,15 @@ class _Layout:
 
     def _second_names(self, data: int, width: int, numeric: frozenset[int]) -> int | None:
         """Return the last row of names behind a few rows of numbers, as those of a summary; None if there is none."""
-        most = max(_FEW_BEFORE, int(_MOST_BEFORE * len(self.rows)))
-        near = pairwise(self.rows[data + 1 : data + 2 * most + 2])
+        most = data + max(_FEW_BEFORE, int(_MOST_BEFORE * len(self.rows)))
         named = [
             k
-            for k, ((_, row), (_, following)) in enumerate(near, data + 1)
+            for k, ((_, row), (_, following)) in enumerate(pairwise(self.rows[data + 1 : most + 2]), data + 1)
             if len(row) > 1
             and not any(is_number(row[c]) or is_missing(row[c]) for c in numeric if c < len(row))
             and _can_be_names(row, width, [set()] * width)
             and all(row != earlier for _, earlier in self.rows[:data])
             and _is_data(following, width, numeric)
-            and sum(_is_data(above, width, numeric) for _, above in self.rows[data:k]) <= most
         ]
         return named[-1] if named else None
 
@@ -439,8 +430,7 @@ class _Layout:
     def _without_texts(self, rows: list[Row], width: int) -> list[Row]:
         """Return the rows without lines of text, as a device prints one between its numbers, or several behind them.
 
-        Behind are words in place of a time, or of a number in the last lines that stand apart, and several words where
-        numbers are expected, and no number there.
+        Those have words in place of a time, or of a number where they stand apart, or several in place of numbers.
         """
         sample = _sample([row for _, row in rows])
         numeric = _numeric_columns(sample, width)
@@ -511,17 +501,16 @@ def _with_remarks(rows: list[Row]) -> list[Row]:
 def _begin_with_names(rows: Sequence[Row], width: int, in_quotes: Container[int]) -> bool:
     """Return whether all rows have so many cells, and number or name themselves in the first, as those of R do.
 
-    Numbers that R has sorted are in another order; from the last to the first, they can be measured. Of a part of
-    the rows, they are names if they alone are `in_quotes`, in these lines.
+    Numbers that R has sorted are in another order; from the last to the first, or of a part of the rows, they can be
+    measured, unless they alone are `in_quotes`.
     """
-    names, n = [row[0] for _, row in rows if len(row) == width], len(rows)
-    if len(set(names)) < max(n, 2):
+    names, count = [row[0] for _, row in rows if len(row) == width], len(rows)
+    if len(set(names)) < max(count, 2):
         return False
     if not any(map(is_number, names)):
-        return n > _FEW_BEFORE
-    counted = {*names} in ({*map(str, range(n))}, {*map(str, range(1, n + 1))})
-    measured = not counted or names == sorted(names, key=int, reverse=True)
-    return not measured or all(number in in_quotes for number, _ in rows)
+        return count > _FEW_BEFORE
+    counted = {*names} in ({*map(str, range(count))}, {*map(str, range(1, count + 1))})
+    return (counted and names != sorted(names, key=int, reverse=True)) or all(n in in_quotes for n, _ in rows)
 
 
 def numbers_with_unit(cells: Sequence[str], of_column: str = "") -> tuple[Sequence[str], str]:
@@ -701,7 +690,7 @@ def _are_units(row: Sequence[str]) -> bool:
 def _are_kinds(row: Sequence[str], *, followed: bool) -> bool:
     """Return whether a row says of which kinds the columns are; letters alone are units, if numbers follow."""
     kinds = {cell.lower() for cell in row} - {""}
-    named = any(len(kind) > 1 for kind in kinds) or ("c" in kinds and followed)
+    named = max(map(len, kinds), default=0) > 1 or ("c" in kinds and followed)
     return named and all(map(_KIND.fullmatch, kinds))
 
 
@@ -741,10 +730,9 @@ def text_of(path: Path, start: str = "") -> str:
     Raises PluginUnavailable, ConfigError if it cannot be read, TooLarge, and DataDamaged if it is not text.
     """
     refuse_devices(path)
-    most = TEXT_BYTES.most
     with readable(path), path.open("rb") as file:
-        data = file.read(most + 1)
-        size = len(data) if len(data) <= most else max(path.stat().st_size, len(data))
+        data = file.read(TEXT_BYTES.most + 1)
+        size = max(path.stat().st_size, len(data))
     if data.startswith(_SPREADSHEETS):
         return spreadsheet_text(path, start)
     if data.startswith(b"\x1f\x8b"):
