@@ -271,8 +271,7 @@ class _Layout:
         data = next((k for k, (_, row) in enumerate(self.rows) if _is_data(row, width, numeric)), None)
         if data is None:
             return _Header(top, None, 1, line)
-        if names := self._second_names(data, width, numeric):
-            data = names + 1
+        data = self._behind_second_names(data, width, numeric)
         above = self._names_in_comments(width, self.rows[data][0])
         plain, self.rows = self.rows, sorted([*self.rows, *above])
         begin = data + len(above)
@@ -290,8 +289,8 @@ class _Layout:
         cells = [(k, cell) for k, cell in enumerate(top) if k not in numeric and cell]
         return any(item in texts or seconds_since_first([item[1]]) is not None for item in cells)
 
-    def _second_names(self, data: int, width: int, numeric: frozenset[int]) -> int | None:
-        """Return the last row of names behind a few rows of numbers, as those of a summary; None if there is none."""
+    def _behind_second_names(self, data: int, width: int, numeric: frozenset[int]) -> int:
+        """Return the row behind the last names that a few rows of numbers precede, as those of a summary, or `data`."""
         most = data + max(_FEW_BEFORE, int(_MOST_BEFORE * len(self.rows)))
         named = [
             k
@@ -302,7 +301,7 @@ class _Layout:
             and all(row != earlier for _, earlier in self.rows[:data])
             and _is_data(following, width, numeric)
         ]
-        return named[-1] if named else None
+        return named[-1] + 1 if named else data
 
     def _names_in_row(self, data: int, width: int, numeric: frozenset[int]) -> _Header | None:
         """Return the names in one of the rows before the numbers, None if none has names. Raises DataDamaged.
@@ -342,7 +341,9 @@ class _Layout:
             self._tell(skipped, "line before them")
         again = (number for number, row in self.rows if kinds and row == beside)
         self._tell(again, "line on the kinds of columns")
-        return _Header(row, None if kinds else beside, data if above_units else names + 1, line, beside)
+        return _Header(
+            row, None if kinds else beside, data if above_units else names + 1, line, beside=beside
+        )
 
     def _without_names(self, data: int, width: int) -> _Header:
         """Return names for numbers without any. Raises DataDamaged if lines before them may have names."""
