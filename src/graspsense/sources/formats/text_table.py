@@ -265,8 +265,7 @@ class _Layout:
         width = max(Counter(map(len, sample)).items(), key=lambda item: (item[1], item[0]))[0]
         line, top = self.rows[0]
         if len(top) == 1 < width and len(divided := self._cells(top[0], width)) == width:
-            top = divided
-            self.rows[0] = (line, top)
+            self.rows[0] = (line, top := divided)
         numeric = _numeric_columns(sample[: max(2, _SAMPLED_SIZE // width)], width)
         data = next((k for k, (_, row) in enumerate(self.rows) if _is_data(row, width, numeric)), None)
         if data is None:
