@@ -187,9 +187,7 @@ def columns_of_numbers(
     commas = any(notations == COMMA for notations in certain)
     of_file = (COMMA if commas else 0) | (THOUSANDS if points else 0)
     return {
-        name: fit
-        if isinstance(fit, NotNumbers)
-        else _read(columns[name], fit, of_file, decimal_commas=decimal_commas)
+        name: fit if isinstance(fit, NotNumbers) else _read(columns[name], fit, of_file, decimal_commas)
         for name, fit in fits.items()
     }
 
@@ -253,7 +251,7 @@ def _common(cells: Sequence[str]) -> int | NotNumbers:
     return common
 
 
-def _read(cells: Sequence[str], common: int, of_file: int, *, decimal_commas: bool) -> Numbers | NotNumbers:
+def _read(cells: Sequence[str], common: int, of_file: int, decimal_commas: bool) -> Numbers | NotNumbers:
     """Return the numbers; `of_file` holds COMMA and THOUSANDS where other columns prove decimal commas or points."""
     if common & POINT:
         # `1.500` is 1500 where all other columns have decimal commas, and beside 975 and 1.000.

@@ -130,8 +130,7 @@ class CsvColumns:
                 f"{self.path}, line {self.lines[int(infinite[0])]}: {name} is infinite; leave the cell empty if the "
                 "value is missing"
             )
-        values: list[float] = number.tolist()
-        return values
+        return list(map(float, number))
 
     def _read_numbers(self) -> dict[str, Numbers | NotNumbers]:
         if self._numbers is None:

@@ -11,8 +11,7 @@ from graspsense.sources.formats.spreadsheet import SPREADSHEET_SUFFIXES
 from graspsense.sources.formats.table import ColumnTable, TableRules
 from graspsense.sources.formats.text_table import JSON_LINES, text_suffix
 
-_TABLE_SUFFIXES: Final = (".csv", ".tsv", ".txt", ".dat", ".data", ".lvm", ".ftd")
-TEXT_SUFFIXES: Final = (*_TABLE_SUFFIXES, *JSON_LINES, *SPREADSHEET_SUFFIXES)
+TEXT_SUFFIXES: Final = (".csv", ".tsv", ".txt", ".dat", ".data", ".lvm", *JSON_LINES, *SPREADSHEET_SUFFIXES)
 BAG_SUFFIXES: Final = (".bag", ".mcap", ".db3")
 PARQUET_SUFFIXES: Final = (".parquet", ".pq")
 READ_SUFFIXES: Final = (*TEXT_SUFFIXES, *ARRAY_SUFFIXES, *BAG_SUFFIXES, *PARQUET_SUFFIXES)

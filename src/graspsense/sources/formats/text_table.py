@@ -63,8 +63,6 @@ _KIND: Final = re.compile(
 )
 """The kind of a column in a line below the names, as Orange and other programs write it, in small letters."""
 _SEPARATOR_LINE: Final = re.compile(r'"?sep=([;,\t|])"?\s*')
-_WHOLE_LINES: Final = (re.compile(r"\s*\|.*\|\s*"), re.compile(r'\s*"(?:[^"]|"")*"\s*'))
-"""Lines in bars, as of Markdown, and in quotes, as a spreadsheet saves what it has not divided."""
 _APOSTROPHES: Final = re.compile(r"[;,\t|]? *'[^']*' *(?:[;,\t|] *'[^']*' *)+[;,\t|]?")
 """Names in apostrophes in place of quotes."""
 _APOSTROPHE: Final = re.compile(r"(?<![^;,\t|])'|'(?![^;,\t|])")
@@ -118,14 +116,13 @@ class TextTable:
 
 
 class _Header(NamedTuple):
-    """The names of the columns in a line (0: none), cells of units if there are any, and the first row behind both."""
+    """The names in a line (0: none), units if any, the first row behind, and the row beside with units or kinds."""
 
     names: list[str]
     units: list[str] | None
     begin: int
     line: int
     beside: list[str] | None = None
-    """The row beside the names that has units or the kinds of the columns."""
 
 
 def read_lines(path: Path, start: str = "") -> tuple[list[Line], bool]:
@@ -138,9 +135,9 @@ def read_lines(path: Path, start: str = "") -> tuple[list[Line], bool]:
     if too_many := CELLS.exceeded(text.count("\n") + text.count("\r")):
         raise DataDamaged(f"{path}: {too_many}")
     lines = list(enumerate(re.split("\r\n|[\r\n]", text), 1))
-    for number, line in lines:
-        if too_long := LINE_CHARACTERS.exceeded(len(line)):
-            raise DataDamaged(f"{path}, line {number}: {too_long}")
+    number, longest = max(lines, key=lambda line: len(line[1]))
+    if too_long := LINE_CHARACTERS.exceeded(len(longest)):
+        raise DataDamaged(f"{path}, line {number}: {too_long}")
     return lines, not text or text.endswith(("\n", "\r"))
 
 
@@ -156,8 +153,7 @@ def table_of(path: Path, lines: Sequence[Line], *, ended: bool = True) -> TextTa
 
 def text_suffix(path: Path) -> str:
     """Return the ending of a name in small letters, without that of a compression."""
-    name = path.name.lower().removesuffix(GZIP)
-    return Path(name).suffix
+    return Path(path.name.lower().removesuffix(GZIP)).suffix
 
 
 class _Layout:
@@ -171,14 +167,11 @@ class _Layout:
         if given:
             written = written[1:]
         self.comments, plain = _comments_and_others(written)
-        for whole in _WHOLE_LINES:
-            if all(whole.fullmatch(line) for _, line in plain):
-                plain = [(number, line.strip()[1:-1].replace('""', '"')) for number, line in plain]
+        if all(re.fullmatch(r"\s*\|.*\|\s*", line) for _, line in plain):
+            plain = [(number, line.strip()[1:-1]) for number, line in plain]
         if any(_APOSTROPHES.fullmatch(line) for _, line in plain[:_FEW_BEFORE]):
             plain = [(number, _APOSTROPHE.sub('"', line)) for number, line in plain]
         self.separator = given[1] if given else _separator([line for _, line in _sample(plain)])
-        if not ended and plain and sum(line.count('"') for _, line in plain) % 2:
-            self._tell_cut(plain.pop()[0])
         plain = self._without_remarks(plain)
         self.numbered = {number for number, line in plain if _QUOTED_NUMBER.match(line)}
         self.blank: list[int] = []
@@ -218,21 +211,18 @@ class _Layout:
     def _without_remarks(self, lines: list[Line]) -> list[Line]:
         """Return the lines without the comments that some have behind their cells."""
         begins = {number: match.start() for number, line in lines if (match := _REMARK.search(line))}
-        if not 0 < 2 * len(begins) < len(lines):
-            return lines
-        others = (_split(line, self.separator) for number, line in lines if number not in begins)
-        ends = {cells[-1] for cells in others if cells}
         width, _ = _width([line for _, line in _sample(lines)], self.separator)
+        ends = {
+            line.rpartition(self.separator)[2].strip(' "') for number, line in lines if number not in begins
+        }
         shorter: dict[int, str] = {}
-        for number, line in lines:
-            text = line[: begins.get(number)].rstrip(f"{self.separator} ")
-            cells = _split(text, self.separator) if number in begins else []
-            if len(cells) == width and (
-                len(_split(line, self.separator)) != width or is_number(cells[-1]) or cells[-1] in ends
-            ):
+        for number, line in lines if 2 * len(begins) < len(lines) else ():
+            text = line[: begins.get(number, 0)].rstrip(f"{self.separator} ")
+            cells = _split(text, self.separator)
+            if len(cells) == width and (is_number(cells[-1]) or cells[-1] in ends):
                 shorter[number] = text
         self._tell(shorter, "line with a comment behind its cells")
-        return [(number, shorter.get(number, line)) for number, line in lines]
+        return [(number, shorter.get(number, line)) for number, line in lines] if shorter else lines
 
     def _rows(self, lines: Sequence[Line]) -> list[Row]:
         """Return the cells of each line that is not empty, without the last columns that none has.
@@ -273,14 +263,12 @@ class _Layout:
         width = max(Counter(map(len, sample)).items(), key=lambda item: (item[1], item[0]))[0]
         line, top = self.rows[0]
         if len(top) == 1 < width and len(divided := self._cells(top[0], width)) == width:
-            top = divided
-            self.rows[0] = (line, top)
+            self.rows[0] = (line, top := divided)
         numeric = _numeric_columns(sample[: max(2, _SAMPLED_SIZE // width)], width)
         data = next((k for k, (_, row) in enumerate(self.rows) if _is_data(row, width, numeric)), None)
         if data is None:
             return _Header(top, None, 1, line)
-        if names := self._second_names(data, width, numeric):
-            data = names + 1
+        data = self._behind_second_names(data, width, numeric)
         above = self._names_in_comments(width, self.rows[data][0])
         plain, self.rows = self.rows, sorted([*self.rows, *above])
         begin = data + len(above)
@@ -298,21 +286,19 @@ class _Layout:
         cells = [(k, cell) for k, cell in enumerate(top) if k not in numeric and cell]
         return any(item in texts or seconds_since_first([item[1]]) is not None for item in cells)
 
-    def _second_names(self, data: int, width: int, numeric: frozenset[int]) -> int | None:
-        """Return the last row of names behind a few rows of numbers, as those of a summary; None if there is none."""
-        most = max(_FEW_BEFORE, int(_MOST_BEFORE * len(self.rows)))
-        near = pairwise(self.rows[data + 1 : data + 2 * most + 2])
+    def _behind_second_names(self, data: int, width: int, numeric: frozenset[int]) -> int:
+        """Return the row behind the last names that a few rows of numbers precede, as those of a summary, or `data`."""
+        most = data + max(_FEW_BEFORE, int(_MOST_BEFORE * len(self.rows)))
         named = [
             k
-            for k, ((_, row), (_, following)) in enumerate(near, data + 1)
+            for k, ((_, row), (_, following)) in enumerate(pairwise(self.rows[data + 1 : most + 2]), data + 1)
             if len(row) > 1
             and not any(is_number(row[c]) or is_missing(row[c]) for c in numeric if c < len(row))
             and _can_be_names(row, width, [set()] * width)
             and all(row != earlier for _, earlier in self.rows[:data])
             and _is_data(following, width, numeric)
-            and sum(_is_data(above, width, numeric) for _, above in self.rows[data:k]) <= most
         ]
-        return named[-1] if named else None
+        return named[-1] + 1 if named else data
 
     def _names_in_row(self, data: int, width: int, numeric: frozenset[int]) -> _Header | None:
         """Return the names in one of the rows before the numbers, None if none has names. Raises DataDamaged.
@@ -336,9 +322,8 @@ class _Layout:
             return None
         names = (above_units or able)[-1]
         line, row = self.rows[names]
-        beside = head[names + 1] if above_units else None
-        if names and not above_units and len(head[names - 1]) == width and _are_units(head[names - 1]):
-            beside = head[names - 1]
+        near = head[names + 1] if above_units else head[names - 1] if names else []
+        beside = near if above_units or (len(near) == width and _are_units(near)) else None
         kinds = beside is not None and _are_kinds(beside, followed=names + 2 < data)
         plain = {number for number, _ in self.rows[:names]} - {number for number, _ in self.comments}
         if skipped := [number for number, row in self.rows[:names] if number in plain and row is not beside]:
@@ -351,20 +336,19 @@ class _Layout:
                 )
             self.notes.append(f"the names of the columns are those of line {line}")
             self._tell(skipped, "line before them")
-        if kinds:
-            self._tell((number for number, row in self.rows if row == beside), "line on the kinds of columns")
-        return _Header(row, None if kinds else beside, data if above_units else names + 1, line, beside)
+        again = (number for number, row in self.rows if kinds and row == beside)
+        self._tell(again, "line on the kinds of columns")
+        return _Header(
+            row, None if kinds else beside, data if above_units else names + 1, line, beside=beside
+        )
 
     def _without_names(self, data: int, width: int) -> _Header:
         """Return names for numbers without any. Raises DataDamaged if lines before them may have names."""
         line, top = self.rows[data]
         ordinals = [*map(str, range(width))]
         if data == 0 and width > 2 and top in (ordinals, ["", *ordinals[:-1]]):
-            self._tell([line], "line with numbers of the columns")
             data = 1
-        elif (data == 1 and _are_numbers(self.rows[0][1])) or all(
-            len(row) == 1 for _, row in self.rows[:data]
-        ):
+        if (data == 1 and _are_numbers(self.rows[0][1])) or all(len(row) == 1 for _, row in self.rows[:data]):
             self._tell([number for number, _ in self.rows[:data]], "line before the numbers without names")
         else:
             raise DataDamaged(
@@ -430,11 +414,6 @@ class _Layout:
         several = what.replace("line ", "lines ", 1) if what.startswith("line ") else f"{what}s"
         self.notes += [f"left out: {counted(len(lines), what, several)} (line {some})"] if lines else []
 
-    def _tell_cut(self, number: int) -> None:
-        """Note that the last line is not whole."""
-        self.notes.append(f"line {number} is cut off, and left out")
-        self.ended = True
-
     def _without_repeats(
         self, rows: list[Row], names: Sequence[str], beside: Sequence[str] | None
     ) -> list[Row]:
@@ -449,8 +428,7 @@ class _Layout:
     def _without_texts(self, rows: list[Row], width: int) -> list[Row]:
         """Return the rows without lines of text, as a device prints one between its numbers, or several behind them.
 
-        Behind are words in place of a time, or of a number in the last lines that stand apart, and several words where
-        numbers are expected, and no number there.
+        Those have words in place of a time, or of a number where they stand apart, or several in place of numbers.
         """
         sample = _sample([row for _, row in rows])
         numeric = _numeric_columns(sample, width)
@@ -486,7 +464,7 @@ class _Layout:
         # An empty last cell may be a missing value, as in other rows.
         if len(last) == width and (last[-1] or not all(ends)) and not shorter:
             return rows
-        self._tell_cut(number)
+        self.notes.append(f"line {number} is cut off, and left out")
         return rows[:-1]
 
 
@@ -521,17 +499,16 @@ def _with_remarks(rows: list[Row]) -> list[Row]:
 def _begin_with_names(rows: Sequence[Row], width: int, in_quotes: Container[int]) -> bool:
     """Return whether all rows have so many cells, and number or name themselves in the first, as those of R do.
 
-    Numbers that R has sorted are in another order; from the last to the first, they can be measured. Of a part of
-    the rows, they are names if they alone are `in_quotes`, in these lines.
+    Numbers that R has sorted are in another order; from the last to the first, or of a part of the rows, they can be
+    measured, unless they alone are `in_quotes`.
     """
-    names, n = [row[0] for _, row in rows if len(row) == width], len(rows)
-    if len(set(names)) < max(n, 2):
+    names, count = [row[0] for _, row in rows if len(row) == width], len(rows)
+    if len(set(names)) < max(count, 2):
         return False
     if not any(map(is_number, names)):
-        return n > _FEW_BEFORE
-    counted = {*names} in ({*map(str, range(n))}, {*map(str, range(1, n + 1))})
-    measured = not counted or names == sorted(names, key=int, reverse=True)
-    return not measured or all(number in in_quotes for number, _ in rows)
+        return count > _FEW_BEFORE
+    counted = {*names} in ({*map(str, range(count))}, {*map(str, range(1, count + 1))})
+    return (counted and names != sorted(names, key=int, reverse=True)) or all(n in in_quotes for n, _ in rows)
 
 
 def numbers_with_unit(cells: Sequence[str], of_column: str = "") -> tuple[Sequence[str], str]:
@@ -703,7 +680,7 @@ def _are_units(row: Sequence[str]) -> bool:
 def _are_kinds(row: Sequence[str], *, followed: bool) -> bool:
     """Return whether a row says of which kinds the columns are; letters alone are units, if numbers follow."""
     kinds = {cell.lower() for cell in row} - {""}
-    named = any(len(kind) > 1 for kind in kinds) or ("c" in kinds and followed)
+    named = max(map(len, kinds), default=0) > 1 or ("c" in kinds and followed)
     return named and all(map(_KIND.fullmatch, kinds))
 
 
@@ -743,10 +720,9 @@ def text_of(path: Path, start: str = "") -> str:
     Raises PluginUnavailable, ConfigError if it cannot be read, TooLarge, and DataDamaged if it is not text.
     """
     refuse_devices(path)
-    most = TEXT_BYTES.most
     with readable(path), path.open("rb") as file:
-        data = file.read(most + 1)
-        size = len(data) if len(data) <= most else max(path.stat().st_size, len(data))
+        data = file.read(TEXT_BYTES.most + 1)
+        size = max(path.stat().st_size, len(data))
     if data.startswith(_SPREADSHEETS):
         return spreadsheet_text(path, start)
     if data.startswith(b"\x1f\x8b"):

@@ -100,11 +100,7 @@ def read_labelled(
         recorded = lines if ranks is None else sorted(lines, key=ranks.__getitem__)
         notes += [] if order is not None else [_no_order(columns, reserved, identified)]
         notes += doubts(columns, labels, table, target, recorded)
-        notes += [
-            f"not held out: trials of one {name} are in training and test data. If it matters, a further {name} is "
-            f"recognised less often than told; {option('instance', name)} holds it out"
-            for name in _sessions(columns, others, instances)
-        ]
+        notes += map(_not_held_out, _sessions(columns, others, instances))
     return Labelled(
         source=str(path),
         table=table,
@@ -119,6 +115,13 @@ def read_labelled(
         value=target,
         notes=tuple(notes),
         provenance={"simulated": export is not None and "1" in columns.cells["simulated"]},
+    )
+
+
+def _not_held_out(name: str) -> str:
+    return (
+        f"not held out: trials of one {name} are in training and test data. If it matters, a further {name} is "
+        f"recognised less often than told; {option('instance', name)} holds it out"
     )
 
 
