@@ -75,7 +75,8 @@ def main() -> int:
     ]
     groups = {**classes, "sets of one label": sizes == 1}
     groups |= {label: known & (np.array(trials.labels) == label) for label in trials.classes}
-    covered = [(name, inside[group]) for name, group in groups.items() if group.any()]
+    with_set = {name: group & (sizes > 0) for name, group in groups.items()}
+    covered = [(name, inside[group]) for name, group in with_set.items() if group.any()]
     asked_for = model.sets.coverage if model.sets is not None else 0.0
     wrong = _certainties(rows, len(rows) + len(covered))
     print(
