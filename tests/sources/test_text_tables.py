@@ -502,7 +502,7 @@ def test_columns_of_one_name_or_none_are_told_apart(tmp_path, lines, names):
 
 def test_json_lines_are_trials(tmp_path):
     path = tmp_path / "trials.jsonl"
-    objects = [{"what": "ab"[k % 2], "pads": {"peak": 0.5 * k * k}} for k in range(12)]
+    objects = [{"what": "ab"[k % 2], "pads": {"peak": 0.5 * (k * k % 11)}} for k in range(12)]
     path.write_text("\n".join(map(json.dumps, objects)))
     labelled = load_trials(str(path), label="what")
     assert (labelled.labels, labelled.table.names) == (("a", "b") * 6, ("pads.peak",))

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 from graspsense.core.learn.target_value import name_and_unit
@@ -77,6 +78,22 @@ def unit_in(heading: str) -> str:
     name, unit = name_and_unit(heading.translate(str.maketrans("()", "[]")))
     symbol = unit in ("min", "h", "d") and not _OF_TIME.match(name)
     return unit if unit.lower() in UNITS - {*WITHOUT_UNIT} and not symbol else ""
+
+
+def names_and_units(headings: Sequence[str]) -> list[tuple[str, str]]:
+    """Return the names and the units of the columns of a table.
+
+    Brackets behind columns of one name are a part of their names, unless these are units.
+
+    >>> names_and_units(["force [N]", "fill [score]", "cell [1]", "cell [2]"])
+    [('force', 'N'), ('fill', 'score'), ('cell [1]', ''), ('cell [2]', '')]
+    """
+    pairs = [name_and_unit(heading) for heading in headings]
+    times = Counter(name for name, _ in pairs)
+    return [
+        (heading, "") if times[pair[0]] > 1 and not unit_in(heading) else pair
+        for heading, pair in zip(headings, pairs, strict=True)
+    ]
 
 
 DATES_S: Final = (946_684_800.0, 4_102_444_800.0)

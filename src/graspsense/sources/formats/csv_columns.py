@@ -17,7 +17,6 @@ from typing import Final, Self
 import numpy as np
 
 from graspsense.core.files.csv_text import text_of_cell
-from graspsense.core.learn.target_value import name_and_unit
 from graspsense.core.values.errors import ConfigError, DataDamaged, counted, listed, suggestion
 from graspsense.core.values.features import FeatureTable
 from graspsense.core.values.label_text import alike_words, is_missing_label, spelled_alike
@@ -38,7 +37,7 @@ from graspsense.sources.formats.text_table import (
     read_lines,
     table_of,
 )
-from graspsense.sources.units import unit_in
+from graspsense.sources.units import names_and_units, unit_in
 
 _INDEXES: Final = (INDEX, "Unnamed: 0")
 """The second is the name that pandas gives such a column when it reads it again."""
@@ -70,7 +69,7 @@ class CsvColumns:
         self.units: dict[str, str] = {}
         self.names: list[str] = []
         self.cells: dict[str, list[str]] = {}
-        headings = [name_and_unit(unicodedata.normalize("NFC", text_of_cell(name))) for name in table.names]
+        headings = names_and_units([unicodedata.normalize("NFC", text_of_cell(name)) for name in table.names])
         called = distinct_names([name for name, _ in headings])
         renamed: list[str] = []
         for name, (given, unit), unit_of_line, column in zip(
