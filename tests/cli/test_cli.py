@@ -231,8 +231,8 @@ def test_a_broken_and_an_observing_plugin_are_listed_and_shown(run, site, monkey
         """
     site.install("lab-observer", observer)
     monkeypatch.setattr(loader, "_current", site.discover(GRASPSENSE_DISABLED_PLUGINS="lab-off"))
-    reason = "ModuleNotFoundError: No module named 'no_such_driver' (`pip check` says what is not installed) in "
-    reason += "installed/lab_broken_plugin.py:1"
+    missing = "ModuleNotFoundError: No module named 'no_such_driver' (`pip check` says what is not installed)"
+    reason = f"{missing} in installed/lab_broken_plugin.py:1"
 
     rows = {row["distribution"]: row for row in run("plugins", "list", "--json").json}
 
