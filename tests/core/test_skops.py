@@ -48,10 +48,10 @@ def trained(name, tmp_path):
     return model
 
 
-SLOW = ("svm", "mlp", "extra-trees", "tree")
+SLOW = ("svm", "mlp", "extra-trees", "forest")
 
 
-@pytest.mark.parametrize("name", ["forest", *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW)])
+@pytest.mark.parametrize("name", ["tree", *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW)])
 def test_it_comes_back_the_same_without_its_training_trials(name, tmp_path):
     model = trained(name, tmp_path)
     assert "trials" not in json.loads((tmp_path / "m.json").read_text())["model"]

@@ -78,6 +78,7 @@ def test_a_replaced_table_is_evaluated_anew_and_it_is_said(tmp_path):
     assert (again.kept, again.done, again.notes) == (1, 0, ())
 
 
+@pytest.mark.slow
 def test_results_keep_their_task_where_data_move_and_are_shown_where_data_are_not(tmp_path, monkeypatch):
     here, there = tmp_path / "here", tmp_path / "there"
     here.mkdir()

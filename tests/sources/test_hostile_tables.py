@@ -203,6 +203,7 @@ def test_long_texts_take_linear_time(tmp_path):
 # Classes and features
 
 
+@pytest.mark.slow
 def test_as_many_labels_as_half_of_the_trials_are_refused_by_every_command(tmp_path):
     """The limit is that of the table, whatever learns from it; each command reads the table in its own way."""
     path = table(tmp_path / "table.csv", [f"c{i // 2}" for i in range(1000)])

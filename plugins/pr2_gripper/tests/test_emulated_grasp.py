@@ -171,6 +171,7 @@ def test_commands_stay_within_limits_whatever_wire_and_board_do(wires, grasps, s
     assert (outcomes["DEVICE_LOST"] >= 1) == (faults is random_faults)
 
 
+@pytest.mark.slow
 @every_case(
     ("fault", "word"), [({"unplug_at_s": 1.4}, "cable"), ({"stall_at_s": 1.4, "stall_s": 2.0}, "no frame")]
 )

@@ -49,6 +49,7 @@ def test_bad_input_is_a_wrong_use(arguments, said):
     assert said in refused("hold", *arguments)
 
 
+@pytest.mark.slow
 def test_a_gripper_that_is_lost_ends_it_and_may_not_be_open():
     done = graspsense("hold", "--seconds", "30", *PR2, "-o", "gripper.faults.unplug_at_s=0.7")
     assert done.returncode == 4

@@ -69,7 +69,7 @@ def test_without_spread_the_trial_grasp_is_the_grasp_that_runs(accuracy):
 
 @pytest.mark.parametrize(
     ("accuracy", "change", "part"),
-    [(0.1, {"spread": True}, 0.5), slow(0.001, {"spread": True}, 0.5), slow(0.001, {}, 0.8)],
+    [slow(0.1, {"spread": True}, 0.5), slow(0.001, {"spread": True}, 0.5), slow(0.001, {}, 0.8)],
 )
 def test_a_verified_model_says_what_a_trial_grasp_found(accuracy, change, part):
     """Where the grasp is to differ from what is tried it has the rest of the accuracy."""
