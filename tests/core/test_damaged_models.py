@@ -208,6 +208,14 @@ def test_a_value_that_does_not_fit_is_refused_by_the_name_of_its_field(tmp_path,
     )
 
 
+def test_a_model_with_one_share_for_each_label_has_it_in_every_class_of_support(tmp_path):
+    path, model = tmp_path / "m.json", trained("c45")
+    write_model(path, model)
+    shares = {label: [0.7, 0.9, 1.1] for label in model.certainty.of_label}
+    resealed(path, lambda content: content.update(certainty_of_label=shares))
+    assert load_model(str(path), installed()).certainty.of_label == model.certainty.of_label
+
+
 class Wayward(Nearest):
     """Raises what its contract does not allow, and then gives what is no probability."""
 

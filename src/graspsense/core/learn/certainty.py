@@ -95,7 +95,7 @@ class LabelShare:
     high: float
 
 
-_ALL_RIGHT: Final = LabelShare(share=1.0, low=1.0, high=1.0)
+_EVERY_LABEL: Final = LabelShare(share=1.0, low=1.0, high=1.0)
 """The share where those of single labels are not known."""
 
 
@@ -142,7 +142,7 @@ class Certainty:
         for i, (k, value, label) in enumerate(zip(numbers, shares, answers.predicted, strict=True)):
             if self.of_label is not None and label not in self.of_label:
                 continue
-            own = _ALL_RIGHT if self.of_label is None else self.of_label[label][k]
+            own = _EVERY_LABEL if self.of_label is None else self.of_label[label][k]
             of_class = self.classes[k]
             step = bisect_right(of_class.probabilities, value + _ROUNDING, lo=1) - 1
             rate = of_class.rates[step]
