@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -22,12 +23,13 @@ def command_line(*, taken: bool = True) -> Iterator[None]:
 def option(name: str, value: str = "", *, python: str = "") -> str:
     """Return an option as the caller gives it; `python` is its name as an argument, where that is another one.
 
-    >>> option("label", "COLUMN")
-    'label=COLUMN'
+    >>> option("label", "COLUMN"), option("label", "tilt angle")
+    ('label=COLUMN', "label='tilt angle'")
     """
+    quoted = shlex.quote(value) if value else ""
     if _commands:
-        return f"--{name.replace('_', '-')}{f' {value}' if value else ''}"
-    return f"{python or name}{f'={value}' if value else ''}"
+        return f"--{name.replace('_', '-')} {quoted}".rstrip()
+    return f"{python or name}={quoted}".rstrip("=")
 
 
 def set_option(*texts: str) -> str:
