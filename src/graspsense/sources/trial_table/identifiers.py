@@ -50,15 +50,15 @@ DIVISIONS: Final = frozenset({
 })  # fmt: skip
 """What trials are told apart and divided by, and what a model said of them."""
 _OF_RECORDINGS: Final = DIVISIONS | {
-    "session", "operator", "experimenter", "tester", "person", "speaker", "volunteer", "participant", "subject", "user", "robot", "host", "lab", "site",
-    "batch", "lot", "block", "series", "group", "round", "run", "cycle", "weekday", "day", "doy", "week", "month",
-    "year", "date", "datetime", "file", "filename", "sitzung", "bediener", "proband", "datum", "wochentag", "tag",
-    "versuch", "datei", "fichier", "jour", "fecha",
+    "session", "operator", "experimenter", "tester", "person", "speaker", "volunteer", "participant", "subject", "user",
+    "robot", "host", "lab", "site", "batch", "lot", "block", "series", "group", "round", "run", "cycle", "weekday",
+    "day", "doy", "week", "month", "year", "date", "datetime", "file", "filename", "sitzung", "bediener", "proband",
+    "datum", "wochentag", "tag", "versuch", "datei", "fichier", "jour", "fecha",
 }  # fmt: skip
 """These, and what was the same for several recordings; no gripper measures it."""
 _NUMBERED: Final = frozenset({
-    "id", "no", "nr", "num", "number", "index", "idx", "name", "code", "of", "or", "the", "in", "for", "used", "set", "data",
-    "dataset", "val", "k", "cv", "md", "mask", "flag", "int", "hex",
+    "id", "no", "nr", "num", "number", "index", "idx", "name", "code", "of", "or", "the", "in", "for", "used", "set",
+    "data", "dataset", "val", "k", "cv", "md", "mask", "flag", "int", "hex",
 })  # fmt: skip
 _FOLLOWS: Final = 0.95
 """Rank correlation with the lines, within each label, of a counter or a clock."""
