@@ -12,6 +12,7 @@ from recorded_files import write_topics
 from repository import ROOT
 
 from graspsense import load_trials
+from graspsense.core.values.errors import DataDamaged
 from graspsense.sources.columns.channel_facts import channel_facts
 from graspsense.sources.manifest.reader import read_recordings
 
@@ -60,6 +61,21 @@ def test_check_on_a_table_tells_each_channel_and_draws_its_squeezes(tmp_path):
     assert len(load["squeezes"]) == 2
     assert load["squeezes"][0] == pytest.approx([1.01, 1.49])
     assert (tmp_path / "x.png").stat().st_size > 5000
+
+
+@every_case("name", ["jar.asc", "jar.log", "jar"])
+def test_a_text_is_read_and_suggested_whatever_its_ending(name, tmp_path):
+    table(tmp_path / name, {"t (ms)": T_S * 1e3, "pos (mm)": GAP_MM, "F (\u00b5N)": FORCE_N * 1e6})
+    graspsense("import", tmp_path / name, "--suggest", tmp_path / "m.toml")
+    (recording,) = read_recordings(str(tmp_path / "m.toml"))
+    assert recording.recording.readings[120].frame.force_left_n == pytest.approx(8.0)
+
+
+def test_a_file_without_a_column_of_numbers_is_refused(tmp_path):
+    (tmp_path / "t.csv").write_text("part,remark\nlid,soft\ncap,hard\n")
+    done = graspsense("import", tmp_path / "t.csv", "--check")
+    assert done.returncode == DataDamaged.exit_code
+    assert "'part'" in done.stderr
 
 
 @pytest.mark.slow
@@ -207,7 +223,7 @@ def test_a_manifest_is_not_written_over_another_one(tmp_path):
     (tmp_path / "m.toml").write_text("mine")
     assert graspsense("import", tmp_path, "--suggest", tmp_path / "m.toml")[0] == 2
     assert (tmp_path / "m.toml").read_text() == "mine"
-    assert graspsense("import", tmp_path / "jar_1.csv", "--suggest", tmp_path / "n.toml")[0] == 2
+    assert graspsense("import", tmp_path / "jar", "--suggest", tmp_path / "n.toml")[0] == 2
     (tmp_path / "empty").mkdir()
     assert graspsense("import", tmp_path / "empty", "--suggest", tmp_path / "n.toml")[0] == 2
     assert not (tmp_path / "n.toml").exists()

@@ -206,6 +206,12 @@ def test_the_numbers_of_rows_that_r_writes_without_a_name_are_the_index(tmp_path
             (b"y,z\n0.5,0\n1.5,1\n" + 512 * end, {"y": [0.5, 1.5], "z": [0.0, 1.0]})
             for end in (b"\0", b"\xff")
         ),
+        (b"y,\tz\n0.5,\t0\n1.5,\t1\n", {"y": [0.5, 1.5], "z": [0.0, 1.0]}),  # a tab behind each comma
+        (
+            b'{"y": 0.5, "z": 0}\n{"y": 1.5, "z": 1}\n',
+            {"y": [0.5, 1.5], "z": [0.0, 1.0]},
+        ),  # JSON by its content
+        ("y,A [mm\u00b2]\n0.5,0\n1.5,1\n".encode("cp1252"), {"y": [0.5, 1.5], "A [mm^2]": [0.0, 1.0]}),
         # A sign or a factor behind a number is no unit.
         *((f"x,y\n0.5{sign},0\n1.5{sign},1\n".encode(), {"y": [0.0, 1.0]}) for sign in ("-", "k", "M")),
     ],
@@ -216,6 +222,14 @@ def test_the_columns_of_numbers_are_known(content, numbers, tmp_path):
     (table,) = read_text(path)
     assert {name: column.tolist() for name, column in table.numbers.items()} == numbers
     assert "x" not in table.units
+
+
+@every_case("word", ["OL", "####", "Overload"])
+def test_what_meters_and_spreadsheets_write_for_a_number_that_is_too_large_is_missing(word, tmp_path):
+    path = tmp_path / "t.csv"
+    path.write_text(f"y,z\n0.5,0\n{word},1\n")
+    (table,) = read_text(path)
+    assert table.numbers["y"].tolist() == pytest.approx([0.5, np.nan], nan_ok=True)
 
 
 @every_case(

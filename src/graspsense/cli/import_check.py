@@ -13,7 +13,7 @@ from attrs import asdict
 from graspsense.cli.output import echo_values
 from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entries, echo_entry, echo_rows, talk
 from graspsense.core.files.whole_file import write_new
-from graspsense.core.values.errors import GraspsenseError, PluginUnavailable
+from graspsense.core.values.errors import PluginUnavailable
 from graspsense.core.values.units import display_unit
 
 if TYPE_CHECKING:
@@ -24,17 +24,14 @@ if TYPE_CHECKING:
 def show_files(sources: Sequence[str], picture: str) -> bool:
     """Print what can be told of files for which neither columns nor a manifest are given, and draw the first.
 
-    Returns False if the sources are other ones, or cannot be read. Raises ConfigError for the picture.
+    Returns False if the sources are other ones. Raises ConfigError, TooLarge, DataDamaged.
     """
     from graspsense.sources.importing.import_sources import is_plain_file
     from graspsense.sources.manifest.understood import understood_file
 
     if not all(map(is_plain_file, sources)):
         return False
-    try:
-        files = [understood_file(Path(os.path.expanduser(source))) for source in sources]
-    except GraspsenseError:
-        return False
+    files = [understood_file(Path(os.path.expanduser(source))) for source in sources]
     echo_values(
         [
             {**asdict(file, filter=lambda field, _: field.name != "courses"), "path": str(file.path)}

@@ -17,6 +17,7 @@ TO_SI: Final[Mapping[str, Mapping[str, float]]] = {
         "N": 1.0,
         "mN": 1e-3,
         "kN": 1e3,
+        "uN": 1e-6,
         "cN": 1e-2,
         "daN": 10.0,
         "gf": 1e-3 * STANDARD_GRAVITY_M_S2,
@@ -43,6 +44,7 @@ _UNIT_WORDS: Final[Mapping[str, Mapping[str, str]]] = {
     },
     "force": {
         **dict.fromkeys(("newton", "newtons"), "N"),
+        **dict.fromkeys(("\u00b5n", "\u03bcn"), "uN"),
         "kp": "kgf",
         **dict.fromkeys(("counts", "count", "raw", "adc"), "counts"),
     },

@@ -38,13 +38,13 @@ _NOTATIONS: Final = (POINT, THOUSANDS, COMMA)
 
 _MISSING_WORDS: Final = frozenset({
     "", "na", "n/a", "n.a.", "<na>", "<missing>", "<undefined>", "nat", "null", "\\n", "none", "?", ".", "missing",
-    "nothing", "nil", "(null)", "no data", "n.d.", "k.a.", "undef"
+    "nothing", "nil", "(null)", "no data", "n.d.", "k.a.", "undef", "ol", "overload"
 })  # fmt: skip
 _MISSING: Final = re.compile(
-    r"\*{4,}|[-+]?(?:nan(?:\(\w*\)|0x[0-9a-f]+)?|1[.,]#(?:q?nan|ind)\d*)|#[^\W\d][^!?]*[!?]|#[\u00a1\u00bf].*|#n/?[adv]|err:\d{3}|\.[a-z]",
+    r"\*{4,}|#{2,}|[-+]?(?:nan(?:\(\w*\)|0x[0-9a-f]+)?|1[.,]#(?:q?nan|ind)\d*)|#[^\W\d][^!?]*[!?]|#[\u00a1\u00bf].*|#n/?[adv]|err:\d{3}|\.[a-z]",
     re.IGNORECASE,
 )
-"""Stars, as Fortran writes a number that is too wide, NaN as the libraries of C write it, the errors of spreadsheets in
+"""Stars and hashes, as Fortran and spreadsheets write a number that is too wide, NaN of C, errors of spreadsheets in
 their languages, such as `#WERT!`, and `.a` of Stata."""
 _LONGEST_MISSING: Final = 20
 

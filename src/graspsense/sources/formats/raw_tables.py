@@ -6,21 +6,45 @@ from pathlib import Path
 from typing import Final
 
 from graspsense.core.values.errors import ConfigError
+from graspsense.recording.readable import readable
 from graspsense.sources.formats.array_format import ARRAY_SUFFIXES, read_arrays
 from graspsense.sources.formats.spreadsheet import SPREADSHEET_SUFFIXES
 from graspsense.sources.formats.table import ColumnTable, TableRules
 from graspsense.sources.formats.text_table import JSON_LINES, text_suffix
 
-TEXT_SUFFIXES: Final = (".csv", ".tsv", ".txt", ".dat", ".data", ".lvm", *JSON_LINES, *SPREADSHEET_SUFFIXES)
+TEXT_SUFFIXES: Final = (
+    ".csv",
+    ".tsv",
+    ".txt",
+    ".dat",
+    ".data",
+    ".asc",
+    ".prn",
+    ".lvm",
+    *JSON_LINES,
+    *SPREADSHEET_SUFFIXES,
+)
 BAG_SUFFIXES: Final = (".bag", ".mcap", ".db3")
 PARQUET_SUFFIXES: Final = (".parquet", ".pq")
 READ_SUFFIXES: Final = (*TEXT_SUFFIXES, *ARRAY_SUFFIXES, *BAG_SUFFIXES, *PARQUET_SUFFIXES)
+_NO_TABLES: Final = (".toml", ".json", ".pdf", ".xml", ".html", ".py", ".m")
+_BEGINNING: Final = 4096
+
+
+def is_text(path: Path) -> bool:
+    """Return whether a file is read as a text: by its ending or, with one that says nothing, as it has no zero byte."""
+    if text_suffix(path) in TEXT_SUFFIXES:
+        return True
+    if text_suffix(path) in (*READ_SUFFIXES, *_NO_TABLES) or not path.is_file():
+        return False
+    with readable(path), path.open("rb") as file:
+        return b"\0" not in file.read(_BEGINNING)
 
 
 def raw_tables(path: Path, rules: TableRules | None = None) -> list[ColumnTable]:
     """Return the tables in a file. Without rules, they are as they come: one for each topic of a bag.
 
-    With rules, a log or a bare name is a text. Raises ConfigError, PluginUnavailable, TooLarge, DataDamaged.
+    Raises ConfigError, PluginUnavailable, TooLarge, DataDamaged.
     """
     suffix, given = path.suffix.lower(), rules or TableRules()
     if path.is_dir() or suffix in BAG_SUFFIXES:
@@ -33,7 +57,7 @@ def raw_tables(path: Path, rules: TableRules | None = None) -> list[ColumnTable]
         return read_parquet(path)
     if suffix in ARRAY_SUFFIXES:
         return read_arrays(path, given)
-    if text_suffix(path) in TEXT_SUFFIXES or (rules is not None and text_suffix(path) in ("", ".log")):
+    if is_text(path):
         from graspsense.sources.formats.text_format import read_text
 
         return read_text(path, given.start)

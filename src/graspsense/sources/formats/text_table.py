@@ -11,7 +11,6 @@ import csv
 import json
 import math
 import re
-import unicodedata
 from collections import Counter
 from collections.abc import Container, Iterable, Iterator, Sequence
 from itertools import chain, compress, pairwise, takewhile
@@ -22,7 +21,7 @@ from typing import Any, Final, NamedTuple
 from attrs import frozen
 
 from graspsense.core.values.errors import DataDamaged, counted, listed
-from graspsense.core.values.limits import CELLS, COLUMNS, LINE_CHARACTERS, TEXT_BYTES
+from graspsense.core.values.limits import CELLS, COLUMNS, LINE_CHARACTERS
 from graspsense.core.values.written_numbers import (
     NotNumbers,
     columns_of_numbers,
@@ -31,9 +30,7 @@ from graspsense.core.values.written_numbers import (
     plain_text,
 )
 from graspsense.core.values.written_times import seconds_since_first
-from graspsense.recording.readable import readable, refuse_devices
-from graspsense.recording.unpacked import Unpacked
-from graspsense.sources.formats.spreadsheet import spreadsheet_text
+from graspsense.sources.formats.file_text import text_of
 from graspsense.sources.units import UNITS
 
 LONGEST_NAME: Final = 500
@@ -45,10 +42,6 @@ INDEX: Final = "index"
 """Name of a first column without a name."""
 _SINGLE_UNITS: Final = frozenset("smgNJWVACK%\u00b0")
 """Units of one sign behind a number: in the other case, or as `12-`, it can be a factor or a sign of its own."""
-_UNSEEN: Final = re.compile(
-    "\u00ef\u00bb\u00bf|[\u061c\u200b\u200e\u200f\u202a-\u202e\u2060\u2066-\u2069\ufeff]"
-)
-"""Marks that nothing shows: of writing, and the order of bytes, also in joined files, or taken for three letters."""
 _SPACES: Final = ("  ", " ")
 """Two spaces or more, where names have spaces, and any number of them."""
 _SEPARATORS: Final = (";", "\t", ",", "|", *_SPACES)
@@ -70,26 +63,13 @@ _QUOTED_NUMBER: Final = re.compile(r'"\d+"[;,\t| ](?:.*[;,\t| ])?[-+.\d]')
 """A number in quotes, as R writes the name of a row, before one without them."""
 _REMARK: Final = re.compile(r"\s(?:#|%|//|!)\s*[^\s\d]")
 """The beginning of a comment behind cells."""
-_SPREADSHEETS: Final = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
-"""The first bytes of a ZIP file, as which spreadsheets are saved, and of those of old programs."""
-_BINARY: Final = (*_SPREADSHEETS, b"PAR1", b"ARROW1")
-"""The same with those of Apache's tables."""
-_CODE_PAGES: Final = (
-    "cp1252", "cp1250", "iso8859-1", "iso8859-15", "cp1251", "koi8-r", "cp1253", "cp1254", "cp1255", "cp1256", "cp850",
-    "mac-roman", "shift_jis", "gb18030", "big5", "euc-kr",
-)  # fmt: skip
-_OF_EUROPE: Final = 4
-"""The first ones agree on degrees, micro and the letters of several languages."""
-_SHOWN_BYTES: Final = 60
-_ZEROS: Final = 10
-"""One byte of so many is zero, at every second place only, in UTF-16 of a table."""
 _SHOWN_AS_IT_IS: Final = re.compile('="(.*)"')
 """A cell that a spreadsheet shall show as it is: ="0.5"."""
 _WITH_UNIT: Final = re.compile(r"(.*[0-9.])\s*([^\s0-9]+)")
 _SAMPLED: Final = 400
 """Lines from which the separator and the kinds of the columns are found."""
 _SAMPLED_SIZE: Final = 100_000
-"""Cells of these lines, and bytes from which the encoding is found."""
+"""Cells of these lines."""
 _FEW_BEFORE: Final = 4
 _MOST_BEFORE: Final = 0.1
 """Lines of numbers before the names, and their share of those after them, beyond which they can be data."""
@@ -146,7 +126,8 @@ def table_of(path: Path, lines: Sequence[Line], *, ended: bool = True) -> TextTa
 
     Raises DataDamaged with the line that does not fit.
     """
-    if text_suffix(path) in JSON_LINES:
+    first = next((line.strip() for _, line in lines if line.strip()), "")
+    if text_suffix(path) in JSON_LINES or (first.startswith('{"') and first.endswith("}")):
         return _json_table(path, lines, ended)
     return _Layout(path, lines, ended).table()
 
@@ -594,6 +575,8 @@ def _separator(lines: Sequence[str]) -> str:
     """
     widths = {separator: _width(lines, separator) for separator in _SEPARATORS}
     agreeing = {separator: count for separator, (width, count) in widths.items() if width > 1}
+    if all("\t" not in re.sub("[;,]\t", "", line) for line in lines):
+        agreeing.pop("\t", None)  # each is behind the sign that separates
     signs = {separator: count for separator, count in agreeing.items() if separator.strip(" ")}
     between = (2 * sum(map(is_number, words)) > len(words) for words in (_split(line, " ") for line in lines))
     tabs = ("\t" in line and _are_numbers(line.split("\t")) for line in lines)
@@ -712,81 +695,3 @@ def check_columns(path: Path, names: Sequence[str]) -> None:
                 f"{path}: the name of column {number} has {len(name)} characters, and at most {LONGEST_NAME} are "
                 f"accepted: {name[:40]!r}..."
             )
-
-
-def text_of(path: Path, start: str = "") -> str:
-    """Return the text of a file, unpacked if it is compressed by gzip; see `read_lines`.
-
-    Raises PluginUnavailable, ConfigError if it cannot be read, TooLarge, and DataDamaged if it is not text.
-    """
-    refuse_devices(path)
-    with readable(path), path.open("rb") as file:
-        data = file.read(TEXT_BYTES.most + 1)
-        size = max(path.stat().st_size, len(data))
-    if data.startswith(_SPREADSHEETS):
-        return spreadsheet_text(path, start)
-    if data.startswith(b"\x1f\x8b"):
-        with readable(path, "a file compressed by gzip"):
-            data = Unpacked(path).unpack("gzip", data)
-            size = max(size, len(data))
-    if data.startswith(_BINARY):
-        raise DataDamaged(f"{path} is an archive or a binary table: save it as CSV in UTF-8")
-    if too_large := TEXT_BYTES.exceeded(size):
-        raise DataDamaged(f"{path}: {too_large}")
-    text = _UNSEEN.sub("", _decoded(path, data)).rstrip("\0")
-    beginning, zero, _ = text.partition("\0")
-    if zero:
-        raise DataDamaged(
-            f"{path}, line {beginning.count(chr(10)) + 1} has zero bytes. If a part of the file was not written, leave "
-            "them out, and the lines that are not whole; else it is not a text file"
-        )
-    return text
-
-
-def _decoded(path: Path, data: bytes) -> str:
-    """Return the text of bytes in UTF-8, UTF-16 or UTF-32, or in a code page if those of Europe agree on it.
-
-    Raises DataDamaged.
-    """
-    unicode = _unicode(data)
-    if unicode == "utf-8-sig":
-        data = data.rstrip(b"\0\xff")  # the part of a card that a logger did not fill
-    try:
-        return data.decode(unicode)
-    except UnicodeDecodeError as error:
-        if unicode != "utf-8-sig":
-            raise DataDamaged(
-                f"{path} begins as {unicode.upper()}, and is none: {error.reason}. Save it as UTF-8"
-            ) from None
-        apart = re.sub(rb"(?<=\d)\x92(?=\d{3})", b"'", data)  # thousands, as Windows has them in Switzerland
-        texts = {apart.decode(code_page, "replace") for code_page in _CODE_PAGES[:_OF_EUROPE]}
-        if len(texts) == 1:
-            return texts.pop()
-        line = data.count(b"\n", 0, error.start) + 1
-        raise DataDamaged(
-            f"{path}, line {line}: byte 0x{data[error.start]:02x} is not UTF-8, and other encodings read the file in "
-            f"different ways, here as {_readings(data, error.start)}. Save it as UTF-8: iconv -f ENCODING -t UTF-8 FILE"
-        ) from None
-
-
-def _unicode(data: bytes) -> str:
-    """Return the encoding that the first bytes tell, or the zeros beside digits, signs and ends of lines."""
-    encoding = json.detect_encoding(data)
-    if encoding not in ("utf-8", "utf-16-le", "utf-16-be"):
-        return encoding
-    sample = data.rstrip(b"\0")[:_SAMPLED_SIZE]
-    even, odd = (sample[k::2].count(0) * _ZEROS > len(sample) for k in (0, 1))
-    return "utf-8-sig" if even == odd else "utf-16-le" if odd else "utf-16-be"
-
-
-def _readings(data: bytes, place: int) -> str:
-    """Return how several encodings read the cell in which this byte is."""
-    begin = max(data.rfind(sign, 0, place) for sign in (b"\n", b"\r", b"\t", b",", b";")) + 1
-    cell = re.split(rb"[\n\r\t,;]", data[begin : begin + _SHOWN_BYTES])[0].strip(b"\"' ")
-    readings: dict[str, str] = {}
-    for code_page in _CODE_PAGES:
-        reading = cell.decode(code_page, "replace")
-        signs = (sign for sign in reading if sign.isalpha() or not sign.isascii())
-        if len({unicodedata.name(sign, "").partition(" ")[0] for sign in signs}) == 1:  # of one script
-            readings.setdefault(reading, code_page)
-    return listed([f"{reading} ({code_page})" for reading, code_page in readings.items()])

@@ -14,8 +14,7 @@ from graspsense.recording.export_trace import declared_beside
 from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
 from graspsense.recording.readable import each_readable, error_of_all
 from graspsense.sources.columns.recording_notices import with_notices
-from graspsense.sources.formats.raw_tables import TEXT_SUFFIXES
-from graspsense.sources.formats.text_table import text_suffix
+from graspsense.sources.formats.raw_tables import is_text
 from graspsense.sources.manifest.alike import compared
 from graspsense.sources.recordings.dataset_recordings import (
     datasets_with_recordings,
@@ -41,7 +40,7 @@ class ImportedRecording:
 
 def is_csv(source: str) -> bool:
     """Return whether a source is a text file whose columns options name."""
-    return text_suffix(Path(source)) in TEXT_SUFFIXES and ":" not in source
+    return ":" not in source and is_text(Path(os.path.expanduser(source)))
 
 
 def is_plain_file(source: str) -> bool:

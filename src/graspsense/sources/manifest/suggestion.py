@@ -24,7 +24,7 @@ from graspsense.core.values.written_numbers import is_number
 from graspsense.recording.readable import readable
 from graspsense.sources.columns.column_guess import Guess, guesses
 from graspsense.sources.formats.array_format import ARRAY_SUFFIXES, COLUMN, GRASP, TIME, arrays_in
-from graspsense.sources.formats.raw_tables import READ_SUFFIXES, TEXT_SUFFIXES, raw_tables
+from graspsense.sources.formats.raw_tables import READ_SUFFIXES, is_text, raw_tables
 from graspsense.sources.formats.table import ColumnTable, TableRules
 from graspsense.sources.formats.text_table import read_lines, text_suffix
 from graspsense.sources.manifest.facts import iso_time
@@ -60,13 +60,16 @@ class Suggestion:
 
 
 def suggested_manifest(folder: Path, place: Path) -> Suggestion:
-    """Return a manifest, to be written into the folder `place`, for the recordings in a folder.
+    """Return a manifest, to be written into the folder `place`, for the recordings in a folder, or for one file.
 
-    Raises ConfigError if it has none that can be read.
+    Raises ConfigError if there is none that can be read.
     """
-    if not os.path.isdir(folder):
-        raise ConfigError(f"{folder} is not a folder: name the folder of the recordings")
-    files = [(name, path) for name, path in tree_below(folder) if _is_recording(path)]
+    if os.path.isfile(folder):
+        folder, files = folder.parent, [(folder.name, folder)]
+    elif os.path.isdir(folder):
+        files = [(name, path) for name, path in tree_below(folder) if _is_recording(path)]
+    else:
+        raise ConfigError(f"{folder} is not there: name the folder of the recordings, or a file")
     if not files:
         raise ConfigError(f"{folder} has no file that is read as a recording: {', '.join(READ_SUFFIXES)}")
     usual = Counter(_ending(path) for _, path in files).most_common(1)[0][0]
@@ -178,7 +181,7 @@ def _common_ending(values: Sequence[str]) -> str:
 
 def _table_of(path: Path) -> tuple[ColumnTable, list[Guess]]:
     """Return a table of a file, and the lines that say how the file is divided. Raises ConfigError, DataDamaged."""
-    if path.is_file() and text_suffix(path) in TEXT_SUFFIXES and (start := _start(path)) is not None:
+    if path.is_file() and is_text(path) and (start := _start(path)) is not None:
         pattern, count = start
         check = f"{count} lines begin a grasp; the names of the fields are those of the words before them"
         guess = Guess(key="start", value=pattern, check=check)

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from attrs import frozen
 
+from graspsense.core.values.errors import DataDamaged, listed
 from graspsense.sources.columns.channel_facts import ChannelFacts, channel_facts
 from graspsense.sources.columns.column_guess import force_columns, guesses, time_column
 from graspsense.sources.formats.raw_tables import raw_tables
@@ -35,6 +36,13 @@ class UnderstoodFile:
 def understood_file(path: Path) -> UnderstoodFile:
     """Return what can be told of a file. Raises ConfigError, TooLarge, DataDamaged."""
     tables = raw_tables(path)
+    if not any(table.numbers for table in tables):
+        texts = listed(
+            [repr(name) for name in dict.fromkeys(name for table in tables for name in table.texts)]
+        )
+        raise DataDamaged(
+            f"{path} has no column of numbers, as a recording has. Its columns are {texts or 'none'}"
+        )
     topics = len({table.source for table in tables}) > 1 and tables[0].t_s is not None
     shown = tables if topics else tables[:1]
     timed = [(table, *_times(table)) for table in shown]

@@ -26,10 +26,10 @@ from graspsense.recording.layout import PADS_TOPIC, SCALARS_TOPIC, SIGNAL_TOPIC,
 from graspsense.recording.readable import readable
 from graspsense.recording.replayable import REPLAY_NOTE, Recording
 from graspsense.sources.columns.fast_samples import latest_values, signals_in_ticks, values_in_ticks
+from graspsense.sources.formats.file_text import text_of
 from graspsense.sources.formats.numpy_files import npz_arrays
 from graspsense.sources.formats.raw_tables import raw_tables
 from graspsense.sources.formats.table import Numbers
-from graspsense.sources.formats.text_table import text_of
 
 Columns = dict[str, NDArray[Any]]
 

@@ -27,8 +27,8 @@ from graspsense.core.values.fingers import PREFIX, FingerForce
 from graspsense.core.values.written_numbers import number_in
 from graspsense.recording.replayable import Recording
 from graspsense.sources.columns.grasp_columns import GraspColumns, checked_recording, finger_sides
+from graspsense.sources.formats.file_text import text_of
 from graspsense.sources.formats.table import Numbers
-from graspsense.sources.formats.text_table import text_of
 
 FIRST_LINE: Final = "-10000"
 DATA_FOLDER: Final = "iCubGraspDataset"
