@@ -78,6 +78,24 @@ def test_a_file_without_a_column_of_numbers_is_refused(tmp_path):
     assert "'part'" in done.stderr
 
 
+def test_goals_errors_counts_and_places_of_a_tool_are_neither_gap_nor_force(tmp_path):
+    sine = 30.0 * np.sin(T_S)
+    columns = {
+        "n_contacts": FORCE_N > 1.0,
+        "gap_error": sine,
+        "x_position": sine,
+        "y_position": sine,
+        "force_cmd": FORCE_N,
+    }
+    table(tmp_path / "jar.csv", {"t": T_S, "stamp": T_S, **columns, "position": GAP_MM, "f": FORCE_N})
+    graspsense("import", tmp_path / "jar.csv", "--suggest", tmp_path / "m.toml")
+    lines = (tmp_path / "m.toml").read_text().splitlines()
+    values = {key: value for key, _, value in (line.partition(" = ") for line in lines)}
+    assert values["gap"].startswith('"position [mm]"')
+    assert values["force"].startswith('"f [')
+    assert "stamp" in values["time"].partition("check:")[2]
+
+
 @pytest.mark.slow
 def test_check_on_a_bag_shows_a_topic_that_died(tmp_path):
     pytest.importorskip("rosbags", reason="needs the extra ros")

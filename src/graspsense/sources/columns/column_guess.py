@@ -29,6 +29,11 @@ FORCE_WORDS: Final = frozenset((
     "force", "forces", "load", "f", "n", "newton", "newtons", "pressure", "pdc", "fsr", "gram", "grams", "g",
     "weight", "eucl", "taxels", "taxel", "tactile", "biotac",
 ))  # fmt: skip
+_NOT_MEASURED: Final = frozenset((
+    "error", "err", "target", "setpoint", "desired", "des", "cmd", "command", "commanded", "reference", "ref", "goal",
+    "requested", "limit", "threshold",
+))  # fmt: skip
+_AXES: Final = frozenset("xyz")
 _LONGEST_STEP_S: Final = 0.25
 """The time between the samples of a grasp, where no unit is stated."""
 _EVEN, _MOSTLY = 0.2, 0.9
@@ -74,6 +79,11 @@ def _with_words(names: Iterable[str], words: Set[str]) -> list[str]:
     return [name for name in names if words & set(words_of(name))]
 
 
+def _measured(names: Iterable[str]) -> list[str]:
+    """Return the names that are not those of a goal, or of how far from it something is."""
+    return [name for name in names if not _NOT_MEASURED & set(words_of(name))]
+
+
 def quoted(name: str) -> str:
     """Return a column as an expression names it."""
     return name if name.isidentifier() else f"'{name}'" if "'" not in name else f'"{name}"'
@@ -99,11 +109,16 @@ def guesses(table: ColumnTable) -> Iterator[Guess]:
 
 def time_column(table: ColumnTable) -> str | None:
     """Return the column that is most likely the time, None if none increases."""
+    return next(iter(_time_columns(table)), None)
+
+
+def _time_columns(table: ColumnTable) -> list[str]:
+    """Return the columns that can be the time, the most likely one first."""
     rising = [name for name, values in table.numbers.items() if values.ndim == 1 and _rises(values)]
     named = _with_words(rising, TIME_WORDS)
     states = [name for name in rising if known_unit(table.units.get(name, ""), "time")]
     units = _with_words(rising, {"ms", "us", "ns", "sec"})
-    return next(iter((*states, *named, *units, *_evenly_rising(table, rising))), None)
+    return [*dict.fromkeys((*states, *named, *units))] or _evenly_rising(table, rising)
 
 
 def _evenly_rising(table: ColumnTable, rising: Sequence[str]) -> list[str]:
@@ -120,7 +135,8 @@ def _evenly_rising(table: ColumnTable, rising: Sequence[str]) -> list[str]:
 
 def force_columns(table: ColumnTable, time: str | None) -> tuple[str, ...]:
     """Return the columns that are most likely forces."""
-    columns = [name for name in table.numbers if name != time]
+    counts = [name for name in table.numbers if words_of(name)[:1] == ("n",) and len(words_of(name)) > 1]
+    columns = [name for name in _measured(table.numbers) if name != time and name not in counts]
     stated = [name for name in columns if _unit(table.units.get(name, ""), "force")]
     others = _with_words(columns, GAP_WORDS | {"torque"})
     named = [name for name in _with_words(columns, FORCE_WORDS) if name not in others]
@@ -189,7 +205,12 @@ def _together(table: ColumnTable, names: Sequence[str]) -> list[str]:
 
 def _gap_columns(table: ColumnTable, taken: Sequence[str | None]) -> tuple[str, ...]:
     """Return the column that is most likely the gap, or several of one kind, as the positions of fingers."""
-    columns = [name for name, values in table.numbers.items() if name not in taken and values.ndim == 1]
+    columns = [
+        name for name in _measured(table.numbers) if name not in taken and table.numbers[name].ndim == 1
+    ]
+    along = _with_words(columns, _AXES)
+    if len(along) > 1:  # where a tool is
+        columns = [name for name in columns if name not in along]
     stated = [name for name in columns if known_unit(table.units.get(name, ""), "gap")]
     named, units = _with_words(columns, GAP_WORDS), _with_words(columns, {"mm", "cm"})
     able = [name for name in (*stated, *named, *units) if np.nanstd(table.numbers[name]) > 0.0]
@@ -199,17 +220,17 @@ def _gap_columns(table: ColumnTable, taken: Sequence[str | None]) -> tuple[str, 
 
 def _time(table: ColumnTable, name: str) -> Guess:
     values = table.numbers[name]
-    stated = _stated(table, name, "time")
-    if stated or unit_since_1970(float(values[0])):  # which the reader tells
-        return Guess(key="time", value=f"{quoted(name)} [{stated}]" if stated else quoted(name))
-    step = float(np.median(np.diff(values)))
-    to_s = TO_SI["time"]
-    unit = next((unit for unit in ("s", "ms", "us", "ns") if step * to_s[unit] <= _LONGEST_STEP_S), "s")
-    rate_hz = 1.0 / (step * to_s[unit]) if step > 0.0 else math.nan
+    others = [quoted(other) for other in _time_columns(table) if other != name]
+    checks = [f"{', '.join(others)} can be the time, too"] if others else []
+    unit = _stated(table, name, "time")
+    if not unit and not unit_since_1970(float(values[0])):  # which the reader tells
+        step = float(np.median(np.diff(values)))
+        to_s = TO_SI["time"]
+        unit = next((unit for unit in ("s", "ms", "us", "ns") if step * to_s[unit] <= _LONGEST_STEP_S), "s")
+        rate_hz = 1.0 / (step * to_s[unit]) if step > 0.0 else math.nan
+        checks.append(f"no unit is stated: [{unit}] gives {rate_hz:.3g} Hz")
     return Guess(
-        key="time",
-        value=f"{quoted(name)} [{unit}]",
-        check=f"no unit is stated: [{unit}] gives {rate_hz:.3g} Hz",
+        key="time", value=f"{quoted(name)} [{unit}]" if unit else quoted(name), check="; ".join(checks)
     )
 
 
@@ -224,6 +245,8 @@ def _gap(table: ColumnTable, names: Sequence[str], force: Numbers | None) -> Gue
     if len(names) > 1:
         expression = f"mean({', '.join(map(quoted, names))})"
         checks.append(f"the mean of {len(names)} columns")
+    if np.nanmin(values) < 0.0 < np.nanmax(values):
+        checks.append("the numbers cross 0, and a gap does not")
     if force is not None:
         moved = float(values[int(np.nanargmax(force))] - values[0])
         if moved > 0.2 * float(np.nanmax(values) - np.nanmin(values)):
