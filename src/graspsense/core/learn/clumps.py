@@ -41,13 +41,13 @@ _CLUMPED: Final = 3.5
 def parts_of_clumps(values: Values, labels: Sequence[str], first_of: Numbers) -> Numbers | None:
     """Return the part of its label that each trial is in, shape (n,); None if trials are not in clumps.
 
-    `values` are the scaled features, shape (n, features). `first_of` has the trial that each one is a copy of, itself
-    if of none: copies do not count.
+    `values` are the scaled features, shape (n, features), NaN for a trial without any. `first_of` has the trial that
+    each one is a copy of, itself if of none: copies do not count.
     """
     from scipy.cluster.hierarchy import fcluster, ward
 
     codes = np.unique(np.array(labels), return_inverse=True)[1]
-    originals = first_of == np.arange(len(codes))
+    originals = (first_of == np.arange(len(codes))) & ~np.isnan(values).any(axis=1)
     rows_of = [np.flatnonzero(originals & (codes == code)) for code in range(codes.max() + 1)]
     judged = [rows for rows in rows_of if len(rows) >= _FEWEST]
     values = values[:, [len(np.unique(column)) >= _FEWEST_VALUES for column in values.T]]

@@ -231,17 +231,24 @@ def _near_copies(labelled: Labelled) -> tuple[Numbers, list[str]]:
 def _scaled(values: Values) -> Values:
     """Return the features without missing values, those with the most different ones, scaled.
 
-    Where fewer than two are without, all count, and a missing value is that of a trial at random: the same one for all
-    would make trials alike.
+    A trial without any has NaN. Where fewer than two features are without, all count, and a trial with a missing value
+    has NaN. If most trials are so, a missing value is that of a trial at random: the same one for all would make trials
+    alike.
     """
-    whole = values[:, ~np.isnan(values).any(axis=0)]
+    known = ~np.isnan(values).all(axis=1)
+    whole = values[:, ~np.isnan(values[known]).any(axis=0)]
     if whole.shape[1] < 2:
         whole, rng = values[:, ~np.isnan(values).all(axis=0)], np.random.default_rng(0)
+        complete = ~np.isnan(whole).any(axis=1)
+        if 2 * complete.sum() > known.sum():
+            known = complete
         for column in whole.T:
             missing = np.isnan(column)
-            column[missing] = rng.choice(column[~missing], int(missing.sum()))
+            column[missing & known] = rng.choice(column[~missing], int((missing & known).sum()))
     finest = np.argsort([-len(np.unique(column)) for column in whole.T], kind="stable")[:_MOST_FEATURES]
-    return scaling_of(whole[:, finest], mean_and_deviation).ready(whole[:, finest])
+    scaled = scaling_of(whole[:, finest], mean_and_deviation).ready(whole[:, finest])
+    scaled[~known] = np.nan
+    return scaled
 
 
 def cells_in_range(distinct: NDArray[np.float64]) -> float:
