@@ -66,8 +66,10 @@ def test_check_on_a_table_tells_each_channel_and_draws_its_squeezes(tmp_path):
 @every_case("name", ["jar.asc", "jar.log", "jar"])
 def test_a_text_is_read_and_suggested_whatever_its_ending(name, tmp_path):
     table(tmp_path / name, {"t (ms)": T_S * 1e3, "pos (mm)": GAP_MM, "F (\u00b5N)": FORCE_N * 1e6})
+    with (tmp_path / name).open("a") as file:  # a second grasp, from whose beginning on the time begins anew
+        file.writelines((tmp_path / name).read_text().splitlines(keepends=True)[1:])
     graspsense("import", tmp_path / name, "--suggest", tmp_path / "m.toml")
-    (recording,) = read_recordings(str(tmp_path / "m.toml"))
+    recording, _ = read_recordings(str(tmp_path / "m.toml"))
     assert recording.recording.readings[120].frame.force_left_n == pytest.approx(8.0)
 
 

@@ -375,6 +375,10 @@ def test_a_clock_that_begins_anew_is_told_from_several_grasps(clock, tmp_path):
     assert says in str(refused.error)
     (several,) = recordings(tmp_path, [HEADER, *ROWS, *ROWS])
     assert "rate_hz" not in str(several.error)
+    assert 'split = "time"' in str(several.error)
+    keys = 'files = "{label}.csv"\ntime = "t"\ngap = "pos [mm]"\nforce = "f1"\nsplit = "time"\n'
+    grasps = recordings(tmp_path, [HEADER, *ROWS, *ROWS], keys)
+    assert [len(grasp.recording.readings) for grasp in grasps] == [N, N]
 
 
 MS = [f"{1000 * float(t):.0f},{other}" for t, _, other in (row.partition(",") for row in ROWS)]

@@ -376,7 +376,7 @@ def _advice_on_times(columns: GraspColumns) -> str:
         return (
             f"The gap goes on there, as where a counter or a clock begins anew: {steady}"
             if goes_on
-            else split
+            else f'If a grasp begins there, write split = "time" in the manifest. {split}'
         )
     if not t_s[-1] > t_s[0]:
         return f"All {len(t_s)} rows have one time, as if it had been written with too few digits: {steady}"

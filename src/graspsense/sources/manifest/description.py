@@ -82,7 +82,8 @@ class Manifest:
     )
     split: str = setting(
         default="",
-        meaning='How a file is split: a column with a value for each grasp, "force" to find the squeezes, or "rows".',
+        meaning='How a file is split: a column with a value for each grasp, "force" to find the squeezes, "time" where '
+        'it begins anew, or "rows".',
     )
     arrays: str = setting(
         default="",

@@ -6,7 +6,7 @@ import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
-from itertools import islice
+from itertools import islice, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -100,6 +100,9 @@ def tables_of(manifest: ReadManifest, file: NamedFile) -> list[ColumnTable]:
         damaged = [table for table in tables if table.damage]
         rows = [table.rows(slice(k, k + 1), f"row {k + 1}") for table in tables for k in range(len(table))]
         return [*rows, *damaged]
+    if split == "time":
+        times = [name for part in manifest.expressions["time"] for name in part.names]
+        return [part for table in tables for part in ([table] if table.damage else _by_clock(table, times))]
     if split and split != "force":
         return [part for table in tables for part in ([table] if table.damage else _by_column(table, split))]
     return tables
@@ -260,6 +263,16 @@ def _rules(manifest: ReadManifest) -> TableRules:
         samples={name for part in parts for name in part.names},
         used={name for part in (*parts, *further) for name in part.names},
     )
+
+
+def _by_clock(table: ColumnTable, times: Sequence[str]) -> list[ColumnTable]:
+    """Return a table for each part in which the time does not go back. Raises DataDamaged."""
+    columns = [table.numbers[name] for name in times if name in table.numbers]
+    begins = [k + 1 for column in columns[:1] for k in np.flatnonzero(np.diff(column) < 0.0).tolist()]
+    if too_many := RECORDINGS.exceeded(len(begins) + 1):
+        raise DataDamaged(f"{table.source}: {too_many}")
+    bounds = pairwise([0, *begins, len(table)])
+    return [table.rows(slice(begin, end), f"part {k}") for k, (begin, end) in enumerate(bounds, 1)]
 
 
 def _by_column(table: ColumnTable, column: str) -> list[ColumnTable]:

@@ -18,11 +18,11 @@ from typing import Final
 import numpy as np
 from attrs import evolve, frozen
 
-from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.errors import ConfigError, counted
 from graspsense.core.values.printable import in_one_line
 from graspsense.core.values.written_numbers import is_number
 from graspsense.recording.readable import readable
-from graspsense.sources.columns.column_guess import Guess, guesses
+from graspsense.sources.columns.column_guess import Guess, guesses, time_column
 from graspsense.sources.formats.array_format import ARRAY_SUFFIXES, COLUMN, GRASP, TIME, arrays_in
 from graspsense.sources.formats.raw_tables import READ_SUFFIXES, is_text, raw_tables
 from graspsense.sources.formats.table import ColumnTable, TableRules
@@ -46,6 +46,8 @@ _TIMES: Final = re.compile("stamp|date|time|start|begin|record")
 _MOST_LABELS: Final = 100
 _ALIKE: Final = 3
 """Most arrays of a file with the same name but for its number that are not taken for grasps."""
+_BEGINNING: Final = 0.1
+"""Share of a recording up to which its time is at the beginning."""
 _FEW: Final = 6
 """Most values of a number that is a label."""
 
@@ -272,6 +274,8 @@ def _label(fields: set[str], table: ColumnTable, divided: Sequence[str]) -> Iter
     if split:
         yield Guess(key="split", value=split, check="its value changes from grasp to grasp")
         yield Guess(key="order", value=f"{{{split}}}", check="whether it is the order of recording")
+    elif not divided and (anew := _times_anew(table)):
+        yield Guess(key="split", value="time", check=f"the time begins anew {counted(anew, 'time')}")
     elif not divided and _is_of_readings(table):
         yield Guess(key="split", value="rows", check="no column is a time, so each row is taken for a grasp")
         yield from _label_of_rows(table)
@@ -334,6 +338,16 @@ def _split_column(table: ColumnTable) -> str:
             if 0 < changes < len(values) / 5 and changes + 1 <= most:
                 return name
     return ""
+
+
+def _times_anew(table: ColumnTable) -> int:
+    """Return how often the time goes back to its beginning, 0 if it also goes back otherwise."""
+    if (name := time_column(table)) is None:
+        return 0
+    since_s = table.numbers[name] - np.nanmin(table.numbers[name])
+    back = np.flatnonzero(np.diff(since_s) < 0.0)
+    anew = since_s[back + 1] <= _BEGINNING * since_s[back]
+    return len(back) * bool(anew.all())
 
 
 def _is_of_readings(table: ColumnTable) -> bool:
