@@ -133,6 +133,10 @@ def _print(predictions: Sequence[Prediction], labels: tuple[str, ...] | None) ->
         (prediction.coverage for prediction in predictions if prediction.coverage is not None), None
     )
     sets = () if coverage is None else (f"{100 * coverage:.0f} % SET",)
+    reasons = Counter(prediction.no_certainty for prediction in predictions if prediction.no_certainty)
+    for reason, count in reasons.items():
+        trials = "" if count == len(predictions) else f" for {count} of {len(predictions)} trials"
+        echo_entry("certainty", f"none{trials}: {reason}")
     header = ("TRIAL", "PREDICTION", "CERTAINTY", *sets, *(("LABEL", "CORRECT") if labels else ()), "BECAUSE")
     rows = []
     for i, prediction in enumerate(predictions):
@@ -141,7 +145,3 @@ def _print(predictions: Sequence[Prediction], labels: tuple[str, ...] | None) ->
         because = "; ".join(reason.words for reason in prediction.because)
         rows.append((str(i + 1), prediction.label, prediction.certainty_figure, *of_set, *label, because))
     echo_table(header, rows, {"PREDICTION": prediction_style, "CORRECT": state_style})
-    reasons = Counter(prediction.no_certainty for prediction in predictions if prediction.no_certainty)
-    for reason, count in reasons.items():
-        trials = "" if count == len(predictions) else f" for {count} of {len(predictions)} trials"
-        echo_entry("certainty", f"none{trials}: {reason}")

@@ -317,19 +317,23 @@ def follows_from(values: Numbers, target: Numbers) -> bool:
 
 def _mixed(numbers: dict[str, Numbers]) -> Iterator[str]:
     """Yield notes on columns in which a number stands for something else, or whose unit changes."""
+    stand_ins: dict[float, list[str]] = {}
     for name, values in numbers.items():
         known = values[~np.isnan(values)]
         stand_in = stand_in_of(known)
         if stand_in is not None:
-            times = int((known == stand_in).sum())
-            yield (
-                f"{name} is {stand_in:g} in {counted(times, 'trial')}, unlike all other values: if it stands for a "
-                "missing value, or a sensor had stopped or was at the end of its range, leave the cell empty"
-            )
+            stand_ins.setdefault(stand_in, []).append(name)
         elif unit_changes(known):
             yield (
                 f"{name} has two groups of values, one a thousand times the other: make sure that all have one unit"
             )
+    for stand_in, names in stand_ins.items():
+        times = int(np.any([numbers[name] == stand_in for name in names], axis=0).sum())
+        yield (
+            f"{listed(names)} {'is' if len(names) == 1 else 'are'} {stand_in:g} in {counted(times, 'trial')}, unlike "
+            "all other values: if it stands for a missing value, or a sensor had stopped or was at the end of its "
+            "range, leave the cell empty"
+        )
 
 
 def _pads_apart(numbers: dict[str, Numbers]) -> Iterator[str]:
