@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import subprocess
@@ -103,6 +104,22 @@ def test_with_json_an_error_is_an_object_on_stdout_too(run):
     assert ran.returncode == 2
     assert ran.stderr == f"graspsense: {message}\n"
     assert ran.json == {"error": {"kind": "ConfigError", "message": message, "exit_code": 2}}
+
+
+@pytest.mark.slow
+def test_what_a_library_prints_beside_python_is_not_among_the_values():
+    done = python(
+        "-c",
+        "import os\n"
+        "from graspsense.cli.main import main\n"
+        "from graspsense.plugins.features.chitta import ChittaFeatures as Loud\n"
+        "extract = Loud.extract\n"
+        "Loud.extract = lambda self, trace: (os.write(1, b'noise of C'), extract(self, trace))[1]\n"
+        "main(['import', 'samples/manifest.toml', '--check', '--json'])",
+        cwd=ROOT,
+    )
+    assert len(json.loads(done.stdout)) > 0
+    assert "noise of C" in done.stderr
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ import re
 import sys
 import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext, redirect_stdout
+from contextlib import contextmanager, nullcontext, redirect_stdout, suppress
 from enum import Enum
 from functools import partial
 from io import StringIO
@@ -61,26 +61,38 @@ StyleOf = Callable[[str], Style | None]
 
 _results: IO[str] | None = None
 _as_values = False
+_kept: int | None = None
+"""A descriptor of stdout, while that of a process leads to stderr: libraries in C print without asking Python."""
 
 
 @contextmanager
 def results_alone_on_stdout() -> Iterator[None]:
     """Within this context stdout has what this module prints; what a plugin prints goes to stderr."""
-    global _results, _as_values
+    global _results, _as_values, _kept
     _results = sys.stdout
     try:
         with nullcontext() if sys.stdout is None else redirect_stdout(sys.stderr):
             yield
     finally:
-        _results, _as_values = None, False
+        if _kept is not None:
+            os.dup2(_kept, 1)
+            os.close(_kept)
+        _results, _as_values, _kept = None, False, None
 
 
 def print_values_alone(asked: bool) -> None:
     """If asked, have stdout get only values, and no text, until the context of the results ends, or the command."""
-    global _as_values
+    global _as_values, _kept
     _as_values = asked
     if asked and _results is None:  # a command that a test invokes by itself
         click.get_current_context().call_on_close(partial(print_values_alone, False))
+    elif asked and _kept is None:
+        with suppress(OSError, ValueError):  # of a stream without a descriptor, or a stderr that is closed
+            if _results is not None and _results.fileno() == 1:
+                _results.flush()
+                os.fstat(2)
+                _kept = os.dup(1)
+                os.dup2(2, 1)
 
 
 def values_alone() -> bool:
@@ -169,7 +181,14 @@ def echo_as_it_is(text: str, *, err: bool = False, end: str = "\n") -> None:
 
 def echo_text_of_values(text: str) -> None:
     """Print what values are written as, also where `print_values_alone` keeps all other text from stdout."""
-    click.echo(printable(text), _results or sys.stdout)
+    if _kept is None:
+        click.echo(printable(text), _results or sys.stdout)
+        return
+    os.dup2(_kept, 1)
+    try:
+        click.echo(printable(text), _results)  # which flushes it
+    finally:
+        os.dup2(2, 1)
 
 
 def echo_in_place(line: str) -> None:
