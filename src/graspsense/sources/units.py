@@ -74,9 +74,21 @@ UNITS: Final = frozenset((
 _OF_TIME: Final = re.compile(r"\W*t\b|.*(time|elapsed|duration|clock|zeit|dauer)", re.IGNORECASE)
 """A heading behind which these are units, and not the least one, a height or a diameter."""
 
+_APART: Final = re.compile(r"(.*\w)(?:, ?| / )(\w+)")
+"""A name and perhaps a unit, without brackets."""
+
 
 def unit_in(heading: str) -> str:
-    """Return the unit behind a name: `Load [N]` or `Load (N)`. Only a time has minutes: `Load (min)` is the least."""
+    """Return the unit behind a name: `Load [N]`, `Load (N)`, `Load / N` or `Load, N`.
+
+    Only a time has minutes: `Load (min)` is the least.
+
+    >>> unit_in("Load [kN]"), unit_in("time, ms"), unit_in("F / N"), unit_in("Load, min"), unit_in("force, left")
+    ('kN', 'ms', 'N', '', '')
+    """
+    apart = _APART.fullmatch(heading)
+    if apart and apart[2] not in ("min", "in") and any(apart[2] in units for units in TO_SI.values()):
+        return apart[2]
     name, unit = name_and_unit(heading.translate(str.maketrans("()", "[]")))
     symbol = unit in ("min", "h", "d") and not _OF_TIME.match(name)
     return unit if unit.lower() in UNITS - {*WITHOUT_UNIT} and not symbol else ""
