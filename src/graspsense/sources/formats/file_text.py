@@ -83,17 +83,16 @@ def _decoded(path: Path, data: bytes) -> str:
             ) from None
         data = re.sub(rb"(?<=\d)\x92(?=\d{3})", b"'", data)  # thousands, as Windows has them in Switzerland
         data = re.sub(rb"(?<=m)\xb2", b"^2", data)  # the other sign of this byte, an ogonek, stands alone
-        first, *others = (data.decode(code_page, "replace") for code_page in _CODE_PAGES[:_OF_EUROPE])
-        differ = [
-            place for other in others if (place := next(compress(count(), map(ne, first, other)), None))
-        ]
+        text, *others = (data.decode(code_page, "replace") for code_page in _CODE_PAGES[:_OF_EUROPE])
+        differ = [place for other in others if (place := next(compress(count(), map(ne, text, other)), None))]
         if not differ:
-            return first
+            return text
         place = min(differ)
+        line = data.count(b"\n", 0, place) + 1
         here = f", here as {readings}" if (readings := _readings(data, place)) else ""
         raise DataDamaged(
-            f"{path}, line {data.count(bytes([10]), 0, place) + 1}: byte 0x{data[place]:02x} is not UTF-8, and other "
-            f"encodings read the file in different ways{here}. Save it as UTF-8: iconv -f ENCODING -t UTF-8 FILE"
+            f"{path}, line {line}: byte 0x{data[place]:02x} is not UTF-8, and other encodings read the file in "
+            f"different ways{here}. Save it as UTF-8: iconv -f ENCODING -t UTF-8 FILE"
         ) from None
 
 

@@ -126,8 +126,8 @@ def table_of(path: Path, lines: Sequence[Line], *, ended: bool = True) -> TextTa
 
     Raises DataDamaged with the line that does not fit.
     """
-    first = next((line.strip() for _, line in lines if line.strip()), "")
-    if text_suffix(path) in JSON_LINES or (first.startswith('{"') and first.endswith("}")):
+    top_line = next((line.strip() for _, line in lines if line.strip()), "")
+    if text_suffix(path) in JSON_LINES or (top_line.startswith('{"') and top_line.endswith("}")):
         return _json_table(path, lines, ended)
     return _Layout(path, lines, ended).table()
 
