@@ -107,6 +107,10 @@ def test_texts_that_name_a_session_or_an_object_are_no_feature(texts):
     assert text_identifies(SESSIONS[texts], LABELS)
 
 
+def test_the_words_of_the_labels_are_a_feature_where_they_answer_another_question():
+    assert not text_identifies(["can", "jar"] * (N // 2), LABELS)
+
+
 KNOWN_IN_ANY_ORDER = {
     **{
         name: COUNTERS[name]

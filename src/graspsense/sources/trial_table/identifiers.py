@@ -88,6 +88,8 @@ _TWO: Final = 1.9
 """Mean number of lines of objects that have two each, but for those at the ends."""
 _HASHED: Final = 1e7
 """Integers from this one on are hashes, if they number objects and are no multiples of 1000."""
+_UNRELATED: Final = 0.2
+"""Correlation below which `yes` and `no` are no predictions of labels of the same words."""
 _TWO_DAYS_S: Final = 172_800.0
 NAME_OBJECTS: Final = "name the objects (say so by --instance)"
 NUMBER_OBJECTS: Final = "number the objects (name them by --instance)"
@@ -190,7 +192,7 @@ def text_identifies(texts: Sequence[str], labels: Sequence[str]) -> str:
     counts = Counter(text for text, _ in given)
     if len(counts) < 2:
         return ""
-    if counts.keys() <= set(labels):
+    if counts.keys() <= set(labels) and not (len(counts) == 2 and _answers_another_question(given)):
         return "are the labels, as those of a prediction are"
     lower = [text.lower() for text in counts]
     of_words = len(counts) > 2 and all(map(_WORDS_OF_DATES.fullmatch, lower))
@@ -204,6 +206,12 @@ def text_identifies(texts: Sequence[str], labels: Sequence[str]) -> str:
         if name_objects(values, known) or (numbered and of_one_label and _enough_objects(len(counts), known)):
             return why
     return "are texts that hardly repeat, as names of trials, files and remarks do" if hardly else ""
+
+
+def _answers_another_question(pairs: Sequence[tuple[str, str]]) -> bool:
+    """Return whether `yes` and `no` do not follow labels of the same words, by the phi coefficient."""
+    text, label = np.array([[word == pairs[0][0] for word in pair] for pair in pairs]).T
+    return bool(label.std() > 0.0 and abs(np.corrcoef(text, label)[0, 1]) < _UNRELATED)
 
 
 def is_count(unit: str) -> bool:
