@@ -162,7 +162,7 @@ def suggestion(word: str, allowed: Iterable[str]) -> str:
         return ""
     comparable = sorted(islice((name for name in allowed if len(name) <= _LONGEST_NAME), _MOST_COMPARED))
     folded = {name.casefold(): name for name in comparable}
-    near = get_close_matches(word.casefold(), folded, n=1, cutoff=0.5)
+    near = get_close_matches(word.casefold(), folded, n=1, cutoff=0.6)
     return f" Did you mean {folded[near[0]]!r}?" if near else ""
 
 

@@ -30,8 +30,8 @@ FORCE_WORDS: Final = frozenset((
     "weight", "eucl", "taxels", "taxel", "tactile", "biotac",
 ))  # fmt: skip
 _NOT_MEASURED: Final = frozenset((
-    "error", "err", "target", "setpoint", "desired", "des", "cmd", "command", "commanded", "reference", "ref", "goal",
-    "requested", "limit", "threshold",
+    "error", "err", "target", "set", "setpoint", "desired", "des", "cmd", "command", "commanded", "reference", "ref",
+    "goal", "requested", "limit", "threshold",
 ))  # fmt: skip
 _AXES: Final = frozenset("xyz")
 _LONGEST_STEP_S: Final = 0.25
@@ -44,7 +44,7 @@ FINGER_WORDS: Final = frozenset(("finger", "fingertip", "tip", "pad", "jaw"))
 _UNLOADED: Final = 4
 """Samples at the beginning of a recording that are taken for those of free fingers."""
 _FREE: Final = 0.1
-"""Largest share of its peak that a force has before the fingers touch."""
+"""Largest share of its peak that a force has before the fingers touch, and of its range that a gap is below 0."""
 _SIDES: Final = (("left", "right"), ("l", "r"))
 _FEWEST_CELLS: Final = 4
 """Numbered columns from which they are the cells of a sensor."""
@@ -245,7 +245,7 @@ def _gap(table: ColumnTable, names: Sequence[str], force: Numbers | None) -> Gue
     if len(names) > 1:
         expression = f"mean({', '.join(map(quoted, names))})"
         checks.append(f"the mean of {len(names)} columns")
-    if np.nanmin(values) < 0.0 < np.nanmax(values):
+    if min(-np.nanmin(values), np.nanmax(values)) > _FREE * (np.nanmax(values) - np.nanmin(values)):
         checks.append("the numbers cross 0, and a gap does not")
     if force is not None:
         moved = float(values[int(np.nanargmax(force))] - values[0])
