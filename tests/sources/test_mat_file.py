@@ -24,7 +24,16 @@ VARIABLES = {
     "long": np.arange(5000) % 7,
     "a_name_that_is_longer_than_eight": 1.0,
 }
-OTHERS = {"waves": np.array([1j]), "cells": np.array([[1, "a"]], dtype=object), "table": {"a": 1.0}}
+OTHERS = {"waves": np.array([1j])}
+TRIALS = np.array(
+    [({"force": np.arange(3.0)}, "jar"), ({"force": np.arange(4.0)}, "can")],
+    dtype=[("pads", "O"), ("what", "O")],
+)
+PARTS = {
+    "grasp": {"gap": np.arange(5.0), "pads": {"left": np.arange(5.0), "note": ""}},
+    "cells": np.array([[np.arange(2.0), "a"]], dtype=object),
+    "trials": TRIALS,
+}
 
 
 def assert_same(content, expected):
@@ -60,9 +69,28 @@ def test_what_is_no_mat_file_is_refused(content, says, tmp_path):
     path.write_bytes(content)
     with pytest.raises(DataDamaged, match=says):
         mat_variables(path)
-    scipy.io.savemat(path, {"jar": {"gap": np.arange(9.0), "force": np.arange(9.0)}})
-    with pytest.raises(ConfigError, match=r"structures.*-v7\.3"):
+    deep = 1.0
+    for _ in range(12):
+        deep = {"x": deep}
+    scipy.io.savemat(path, {"deep": deep})
+    with pytest.raises(DataDamaged, match="nested"):
         mat_variables(path)
+
+
+@pytest.mark.parametrize("compressed", [False, True])
+def test_the_parts_of_structures_and_cells_have_paths(compressed, tmp_path):
+    scipy.io.savemat(tmp_path / "a.mat", PARTS, do_compression=compressed)
+    read = mat_variables(tmp_path / "a.mat")
+    assert {path: array.ravel().tolist() for path, array in read.items()} == {
+        "grasp/gap": [0.0, 1.0, 2.0, 3.0, 4.0],
+        "grasp/pads/left": [0.0, 1.0, 2.0, 3.0, 4.0],
+        "cells/1": [0.0, 1.0],
+        "cells/2": ["a"],
+        "trials/1/pads/force": [0.0, 1.0, 2.0],
+        "trials/1/what": ["jar"],
+        "trials/2/pads/force": [0.0, 1.0, 2.0, 3.0],
+        "trials/2/what": ["can"],
+    }
 
 
 def test_version_4(tmp_path):

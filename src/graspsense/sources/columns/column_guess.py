@@ -135,12 +135,14 @@ def _evenly_rising(table: ColumnTable, rising: Sequence[str]) -> list[str]:
 
 def force_columns(table: ColumnTable, time: str | None) -> tuple[str, ...]:
     """Return the columns that are most likely forces."""
-    counts = [name for name in table.numbers if words_of(name)[:1] == ("n",) and len(words_of(name)) > 1]
-    columns = [name for name in _measured(table.numbers) if name != time and name not in counts]
+    columns = [name for name in _measured(table.numbers) if name != time]
     stated = [name for name in columns if _unit(table.units.get(name, ""), "force")]
     others = _with_words(columns, GAP_WORDS | {"torque"})
     named = [name for name in _with_words(columns, FORCE_WORDS) if name not in others]
     strong = _with_words(named, FORCE_WORDS - {"f", "n", "g"})
+    named = [
+        name for name in named if words_of(name)[0] != "n" or len(words_of(name)) == 1
+    ]  # no `n_contacts`
     return tuple(stated or strong or named or _unnamed_forces(table, columns))
 
 

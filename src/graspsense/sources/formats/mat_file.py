@@ -1,4 +1,4 @@
-"""MAT files: their variables that are full arrays of numbers or one line of text.
+"""MAT files: their variables that are full arrays of numbers or one line of text, also in structures and cells.
 
 The reader of scipy ends the process on some damaged files, so this is one of our own. Nothing is allocated before its
 size was compared with the bytes that are there and with the limit. The format is that of MathWorks, "MAT-File Format".
@@ -30,11 +30,14 @@ _STORED: Final[Mapping[int, str]] = {
 _CHARACTERS: Final[Mapping[int, str]] = {
     1: "latin-1", 2: "latin-1", 4: "utf-16", 16: "utf-8", 17: "utf-16", 18: "utf-32",
 }  # fmt: skip
-_CHAR: Final = 4
+_CELL, _STRUCTURE, _CHAR = 1, 2, 4
+_MOST: Final = 100_000
+_DEEPEST: Final = 8
+"""Most parts of a path behind the name of a variable."""
 _NUMERIC: Final[Mapping[int, str]] = {
     6: "f8", 7: "f4", 8: "i1", 9: "u1", 10: "i2", 11: "u2", 12: "i4", 13: "u4", 14: "i8", 15: "u8",
 }  # fmt: skip
-"""Class of a variable to its numbers. Cells, structures, objects and sparse matrices have other classes."""
+"""Class of a variable to its numbers. Objects and sparse matrices have other classes, which are not read."""
 _COMPLEX: Final = 0x0800
 _STORED_BY_4: Final = ("f8", "f4", "i4", "i2", "u2", "u1")
 
@@ -53,16 +56,17 @@ def mat_variables(path: Path) -> dict[str, NDArray[Any]]:
         (version,) = struct.unpack_from(f"{order}H", data, _HEADER_BYTES - 4)
         if version >> 8 == 2:  # version 7.3
             return hdf5_arrays(path, "\n  or save the file in MATLAB with: save(NAME, '-v7')")
-        variables = {}
+        variables: dict[str, NDArray[Any]] = {}
         for kind, content in _elements(data[_HEADER_BYTES:], order):
             if kind == _COMPRESSED:
                 ((kind, content),) = _elements(unpacked.unpack("zlib", content), order)
-            if kind == _MATRIX and (variable := _variable(content, order)) is not None:
-                variables[variable[0]] = variable[1]
+            for name, variable in _variables(content, order) if kind == _MATRIX else ():
+                variables[name] = variable
+                if len(variables) > _MOST:
+                    raise ValueError(f"it has more than {_MOST} arrays")
     if not variables:
         raise ConfigError(
-            f"{path} has no array at its top level, and structures and cells are not read. Save the file with "
-            "save(NAME, '-v7.3'), which gives the fields of a structure paths: arrays = \"S/{label}/{column}\""
+            f"{path} has no array of numbers. Tables and objects of MATLAB are saved as structures first"
         )
     return variables
 
@@ -83,21 +87,45 @@ def _elements(data: bytes, order: str) -> Iterator[tuple[int, bytes]]:
             position += -position % 8
 
 
-def _variable(data: bytes, order: str) -> tuple[str, NDArray[Any]] | None:
-    """Return name and value of a variable, None if it is of another class than those that are read."""
+def _variables(data: bytes, order: str, path: str = "") -> Iterator[tuple[str, NDArray[Any]]]:
+    """Yield path and value of a variable, or of those in it: `jar/force`, `trials/3/force`. Other classes have none."""
+    if not data:  # an empty cell
+        return
     (_, flags), (_, dimensions), (_, name), *values = _elements(data, order)
     (word,) = struct.unpack_from(f"{order}I", flags)
-    shape = np.frombuffer(dimensions, dtype=f"{order}i4").tolist()
-    if not values or word & _COMPLEX or (word & 0xFF) not in (*_NUMERIC, _CHAR):
-        return None
-    if word & 0xFF == _CHAR:
-        text = _text(*values[0], order)
-        return (name.decode("latin-1"), np.array([text])) if shape[:1] == [1] and text else None
-    kind, stored = values[0]
-    numbers = np.frombuffer(stored, dtype=f"{order}{_STORED[kind]}")
-    if min(shape, default=0) < 0 or math.prod(shape) != len(numbers):
-        raise ValueError(f"a variable of the shape {tuple(shape)} has {len(numbers)} numbers")
-    return name.decode("latin-1"), numbers.astype(_NUMERIC[word & 0xFF]).reshape(shape, order="F")
+    path, kind = path or name.decode("latin-1"), word & 0xFF
+    if kind in (_CELL, _STRUCTURE):
+        if path.count("/") > _DEEPEST:
+            raise ValueError(f"{path[:40]}... is nested too deep")
+        yield from _parts(values, order, path, kind)
+    elif kind == _CHAR:
+        text = _text(*values[0], order) if values else ""
+        if text and np.frombuffer(dimensions, dtype=f"{order}i4")[0] == 1:
+            yield path, np.array([text])
+    elif kind in _NUMERIC and values and not word & _COMPLEX:
+        shape = np.frombuffer(dimensions, dtype=f"{order}i4").tolist()
+        numbers = np.frombuffer(values[0][1], dtype=f"{order}{_STORED[values[0][0]]}")
+        if min(shape, default=0) < 0 or math.prod(shape) != len(numbers):
+            raise ValueError(f"a variable of the shape {tuple(shape)} has {len(numbers)} numbers")
+        yield path, numbers.astype(_NUMERIC[kind]).reshape(shape, order="F")
+
+
+def _parts(
+    values: list[tuple[int, bytes]], order: str, path: str, kind: int
+) -> Iterator[tuple[str, NDArray[Any]]]:
+    """Yield the variables in a cell array, or in the fields of a structure; several structures have numbers."""
+    fields = [""]
+    if kind == _STRUCTURE:
+        (_, length), (_, names), *values = values
+        (size,) = struct.unpack_from(f"{order}i", length)
+        fields = [
+            names[k : k + size].partition(b"\0")[0].decode("latin-1") for k in range(0, len(names), size)
+        ]
+    numbered = kind == _CELL or len(values) > len(fields)
+    for k, (_, content) in enumerate(values):
+        number = f"/{k // len(fields) + 1}" if numbered else ""
+        field = f"/{fields[k % len(fields)]}".rstrip("/")
+        yield from _variables(content, order, f"{path}{number}{field}")
 
 
 def _text(kind: int, data: bytes, order: str) -> str:
