@@ -98,6 +98,18 @@ def test_goals_errors_counts_and_places_of_a_tool_are_neither_gap_nor_force(tmp_
     assert "stamp" in values["time"].partition("check:")[2]
 
 
+def test_the_components_of_a_force_are_suggested_as_its_length(tmp_path):
+    forces = {
+        f"{side}_f{axis}": share * FORCE_N
+        for side in ("left", "right")
+        for axis, share in (("x", 0.6), ("y", 0.0), ("z", -0.8))
+    }
+    table(tmp_path / "jar.csv", {"t (s)": T_S, "pos (mm)": GAP_MM, **forces})
+    graspsense("import", tmp_path / "jar.csv", "--suggest", tmp_path / "m.toml")
+    (recording,) = read_recordings(str(tmp_path / "m.toml"))
+    assert recording.recording.readings[120].frame.force_left_n == pytest.approx(8.0)
+
+
 @pytest.mark.slow
 def test_check_on_a_bag_shows_a_topic_that_died(tmp_path):
     pytest.importorskip("rosbags", reason="needs the extra ros")

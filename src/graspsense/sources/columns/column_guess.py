@@ -26,8 +26,8 @@ GAP_WORDS: Final = frozenset((
     "stroke", "spread", "extension",
 ))  # fmt: skip
 FORCE_WORDS: Final = frozenset((
-    "force", "forces", "load", "f", "n", "newton", "newtons", "pressure", "pdc", "fsr", "gram", "grams", "g",
-    "weight", "eucl", "taxels", "taxel", "tactile", "biotac",
+    "force", "forces", "load", "f", "fx", "fy", "fz", "n", "newton", "newtons", "pressure", "pdc", "fsr", "gram",
+    "grams", "g", "weight", "eucl", "taxels", "taxel", "tactile", "biotac",
 ))  # fmt: skip
 _NOT_MEASURED: Final = frozenset((
     "error", "err", "target", "set", "setpoint", "desired", "des", "cmd", "command", "commanded", "reference", "ref",
@@ -292,7 +292,8 @@ def _forces(table: ColumnTable, names: Sequence[str]) -> Iterator[Guess]:
         return
     groups = _numbered_groups(names)
     cells = all(len(group) >= _FEWEST_CELLS for group in groups)
-    groups = groups if cells else [[name] for name in names]
+    components = _components(names)
+    groups = components or (groups if cells else [[name] for name in names])
     heads = [group[0] for group in groups]
     sides = next((sides for pair in _SIDES if (sides := _sided(heads, pair)) is not None), None)
     said = ""
@@ -304,8 +305,22 @@ def _forces(table: ColumnTable, names: Sequence[str]) -> Iterator[Guess]:
     if sides is None:
         array = table.numbers[names[0]].ndim == 2
         said = "the mean of its cells" if cells else "the sum of its numbers" if array else ""
+    if components:
+        said = f"the length of a force from its components; {said}".removesuffix("; ")
     for key, side in zip(("left", "right"), sides, strict=True) if sides else [("force", heads)]:
         yield _force(table, key, [group for group in groups if group[0] in side], said)
+
+
+def _components(names: Sequence[str]) -> list[list[str]]:
+    """Return the columns that differ only in x, y and z, in groups of three: the components of a force.
+
+    >>> _components(["Fx", "Fy", "Fz", "|Ft|"]), _components(["f1", "f2"])
+    ([['Fx', 'Fy', 'Fz']], [])
+    """
+    groups: dict[str, list[str]] = {}
+    for name in names:
+        groups.setdefault(re.sub("[xyz]", "*", name, count=1, flags=re.IGNORECASE), []).append(name)
+    return [group for key, group in groups.items() if len(group) == 3 and "*" in key]
 
 
 def _sided(names: Sequence[str], pair: tuple[str, str]) -> tuple[Sequence[str], Sequence[str]] | None:
@@ -324,10 +339,13 @@ def _force(table: ColumnTable, key: str, groups: Sequence[Sequence[str]], said: 
         checks.append("whole numbers are taken for counts" if unit == "counts" else "no unit is stated")
     elif unit == "gf":
         checks.append("a mass is taken for gram-force")
-    array = table.numbers[names[0]].ndim == 2
-    inside = ", ".join(name for group in groups for name in _together(table, group))
-    fold = "sum" if array else "max" if len(groups[0]) == 1 else "mean"
-    value = f"{fold}({inside})" if array or len(names) > 1 else inside
+    array, fold = table.numbers[names[0]].ndim == 2, "max" if len(groups[0]) == 1 else "mean"
+    parts = [name for group in groups for name in _together(table, group)]
+    several = len(names) > 1
+    if _components(names):
+        parts, fold = [f"norm({', '.join(map(quoted, group))})" for group in groups], "max"
+        several = len(parts) > 1
+    value = f"{'sum' if array else fold}({', '.join(parts)})" if array or several else parts[0]
     return Guess(key=key, value=f"{value} [{unit}]", check="; ".join(checks))
 
 
