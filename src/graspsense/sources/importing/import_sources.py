@@ -96,9 +96,10 @@ def _named_by(
         return
     if kind not in KINDS:
         kinds = ", ".join(f"{known}:" for known in known_kinds())
+        nor_file = "" if os.path.exists(source) else ", nor is there a file of this name"
         folder = f". Of a folder, graspsense import {source} --suggest FILE.toml writes a manifest"
         raise ConfigError(
-            f"{source!r} is not a source of recordings: name a FILE.csv, {', '.join(KIND_OF)}, a "
+            f"{source!r} is not a source of recordings{nor_file}: name a FILE.csv, {', '.join(KIND_OF)}, a "
             f"manifest FILE.toml, or write one of {kinds} before a file{how_to_get(kind)}"
             f"{folder if Path(source).is_dir() else ''}"
         )
