@@ -76,15 +76,20 @@ def _pieces_of(decompressor: Any, data: bytes) -> Iterator[bytes]:
         yield part
 
 
-def _pieces_of_zlib(data: bytes, window: int = zlib.MAX_WBITS) -> Iterator[bytes]:
-    """Yield what the data holds; a file of gzip may hold several streams one after the other."""
+def _pieces_of_zlib(data: bytes, window: int = zlib.MAX_WBITS, *, ended: bool = True) -> Iterator[bytes]:
+    """Yield what the data holds; a file of gzip may hold several streams one after the other.
+
+    A stream that is not `ended` may lack its end, as MATLAB leaves it out behind whole pieces of 64 KiB.
+    """
     while data:
         stream = zlib.decompressobj(window)
         while not stream.eof:
             part = stream.decompress(data, _PIECE)
             data = stream.unconsumed_tail
             if not part and not data:
-                raise ValueError("the compressed data ends early")
+                if ended:
+                    raise ValueError("the compressed data ends early")
+                break
             yield part
         data = stream.unused_data if window == _GZIP else b""
 
@@ -101,6 +106,7 @@ def _pieces_of_zstd(data: bytes) -> Iterator[bytes]:
 
 _PIECES: Final[Mapping[str, Callable[[bytes], Iterator[bytes]]]] = {
     "zlib": _pieces_of_zlib,
+    "zlib of MATLAB": lambda data: _pieces_of_zlib(data, ended=False),
     "gzip": lambda data: _pieces_of_zlib(data, _GZIP),
     "zstd": _pieces_of_zstd,
     "lz4": lambda data: _pieces_of(lz4.frame.LZ4FrameDecompressor(), data),

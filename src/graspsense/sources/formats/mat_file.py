@@ -59,7 +59,7 @@ def mat_variables(path: Path) -> dict[str, NDArray[Any]]:
         variables: dict[str, NDArray[Any]] = {}
         for kind, content in _elements(data[_HEADER_BYTES:], order):
             if kind == _COMPRESSED:
-                ((kind, content),) = _elements(unpacked.unpack("zlib", content), order)
+                ((kind, content),) = _elements(unpacked.unpack("zlib of MATLAB", content), order)
             for name, variable in _variables(content, order) if kind == _MATRIX else ():
                 variables[name] = variable
                 if len(variables) > _MOST:

@@ -30,7 +30,7 @@ def spreadsheet_text(path: Path, start: str) -> str:
     sheets = json.loads(names)
     if len(sheets) > 1 and not start:
         raise ConfigError(
-            f"{path} has {len(sheets)} sheets: {listed(sheets)}. Save the one that is meant as a file of its own, or "
-            "hide the others; if each is a grasp, say so in a manifest: start = '^sheet (?P<label>.*)'"
+            f"{path} has {len(sheets)} sheets: {listed(sheets)}. Say in a manifest which is meant, "
+            "start = '^sheet NAME$', or that each is a grasp, start = '^sheet (?P<label>.*)'; or hide the others"
         )
     return text
