@@ -94,6 +94,13 @@ def test_the_parts_of_structures_and_cells_have_paths(compressed, tmp_path):
     }
 
 
+def test_what_matlab_keeps_without_a_name_is_left_out(tmp_path):
+    path = tmp_path / "a.mat"
+    scipy.io.savemat(path, {"x": np.uint8([1, 2]), "gap": np.arange(3.0)})
+    path.write_bytes(path.read_bytes().replace(b"\1\0\1\0x\0\0\0", b"\1\0\0\0\0\0\0\0"))
+    assert list(mat_variables(path)) == ["gap"]
+
+
 def test_a_stream_without_its_end_is_read_if_its_numbers_are_there(tmp_path):
     """As MATLAB writes what fills pieces of 64 KiB."""
     path = tmp_path / "a.mat"

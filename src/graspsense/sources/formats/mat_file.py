@@ -94,6 +94,8 @@ def _variables(data: bytes, order: str, path: str = "") -> Iterator[tuple[str, N
     (_, flags), (_, dimensions), (_, name), *values = _elements(data, order)
     (word,) = struct.unpack_from(f"{order}I", flags)
     path, kind = path or name.decode("latin-1"), word & 0xFF
+    if not path:  # what MATLAB keeps of objects
+        return
     if kind in (_CELL, _STRUCTURE):
         if path.count("/") > _DEEPEST:
             raise ValueError(f"{path[:40]}... is nested too deep")
