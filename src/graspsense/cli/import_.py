@@ -65,7 +65,9 @@ FEW: Final = 3
 )
 @click.option("--save", metavar="DIR", help="Store for the trials.")
 @click.option("--check", is_flag=True, help="Only print what was understood, and draw one grasp.")
-@click.option("--suggest", metavar="FILE.toml", help="Write a manifest for the folder SOURCES, to correct.")
+@click.option(
+    "--suggest", metavar="FILE.toml", help="Write a manifest for the folder or file SOURCES, to correct."
+)
 @click.option(
     "--plot",
     metavar="FILE.png",

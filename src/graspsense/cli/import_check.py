@@ -45,11 +45,11 @@ def show_files(sources: Sequence[str], picture: str) -> bool:
 
 
 def suggest_manifest(sources: Sequence[str], name: str) -> None:
-    """Write a manifest for a folder, and print it with what reading it says. Raises ConfigError, SaveFailed."""
+    """Write a manifest for a folder or a file, and print it with what it says. Raises ConfigError, SaveFailed."""
     from graspsense.sources.manifest.suggestion import suggested_manifest
 
     if len(sources) != 1:
-        raise click.UsageError("--suggest is for one folder with recordings")
+        raise click.UsageError("--suggest is for one folder with recordings, or one file")
     path, folder = Path(os.path.expanduser(name)), Path(os.path.expanduser(sources[0]))
     if path.suffix != ".toml":
         raise click.UsageError(f"--suggest {name}: a manifest is a file FILE.toml")

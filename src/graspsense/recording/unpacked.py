@@ -51,7 +51,7 @@ class Unpacked:
         self.total += size
 
     def unpack(self, compression: str, data: bytes) -> bytes:
-        """Return what compressed data holds; `compression` is `zstd`, `lz4`, `bz2`, `zlib`, `gzip` or empty.
+        """Return what compressed data holds; `compression` is a key of `_PIECES`, or empty.
 
         Raises TooLarge, ValueError, and what the library raises on damaged data.
         """

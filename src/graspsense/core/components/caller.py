@@ -26,10 +26,9 @@ def option(name: str, value: str = "", *, python: str = "") -> str:
     >>> option("label", "COLUMN"), option("label", "tilt angle")
     ('label=COLUMN', "label='tilt angle'")
     """
-    quoted = shlex.quote(value) if value else ""
     if _commands:
-        return f"--{name.replace('_', '-')} {quoted}".rstrip()
-    return f"{python or name}={quoted}".rstrip("=")
+        return f"--{name.replace('_', '-')}{f' {shlex.quote(value)}' if value else ''}"
+    return f"{python or name}{f'={shlex.quote(value)}' if value else ''}"
 
 
 def set_option(*texts: str) -> str:

@@ -33,7 +33,9 @@ _NOT_MEASURED: Final = frozenset((
     "error", "err", "target", "set", "setpoint", "desired", "des", "cmd", "command", "commanded", "reference", "ref",
     "goal", "requested", "limit", "threshold",
 ))  # fmt: skip
+"""Words of what a controller asks for, or misses."""
 _AXES: Final = frozenset("xyz")
+"""Words of the coordinates of a tool, where a table has several."""
 _LONGEST_STEP_S: Final = 0.25
 """The time between the samples of a grasp, where no unit is stated."""
 _EVEN, _MOSTLY = 0.2, 0.9
@@ -308,7 +310,8 @@ def _forces(table: ColumnTable, names: Sequence[str]) -> Iterator[Guess]:
     if components:
         said = f"the length of a force from its components; {said}".removesuffix("; ")
     for key, side in zip(("left", "right"), sides, strict=True) if sides else [("force", heads)]:
-        yield _force(table, key, [group for group in groups if group[0] in side], said)
+        own = [group for group in groups if group[0] in side]
+        yield _force(table, key, own, said, components=bool(components))
 
 
 def _components(names: Sequence[str]) -> list[list[str]]:
@@ -328,8 +331,10 @@ def _sided(names: Sequence[str], pair: tuple[str, str]) -> tuple[Sequence[str], 
     return (left, right) if left and right and len(left) + len(right) == len(names) else None
 
 
-def _force(table: ColumnTable, key: str, groups: Sequence[Sequence[str]], said: str) -> Guess:
-    """Return the force of single columns, or of groups of cells."""
+def _force(
+    table: ColumnTable, key: str, groups: Sequence[Sequence[str]], said: str, *, components: bool
+) -> Guess:
+    """Return the force of single columns, or of groups of cells or of components."""
     names = [name for group in groups for name in group]
     unit, checks = _stated(table, names[0], "force"), [said] if said else []
     values = _cells(table, names)
@@ -340,11 +345,11 @@ def _force(table: ColumnTable, key: str, groups: Sequence[Sequence[str]], said: 
     elif unit == "gf":
         checks.append("a mass is taken for gram-force")
     array, fold = table.numbers[names[0]].ndim == 2, "max" if len(groups[0]) == 1 else "mean"
-    parts = [name for group in groups for name in _together(table, group)]
-    several = len(names) > 1
-    if _components(names):
+    if components:
         parts, fold = [f"norm({', '.join(map(quoted, group))})" for group in groups], "max"
-        several = len(parts) > 1
+    else:
+        parts = [name for group in groups for name in _together(table, group)]
+    several = len(groups if components else names) > 1
     value = f"{'sum' if array else fold}({', '.join(parts)})" if array or several else parts[0]
     return Guess(key=key, value=f"{value} [{unit}]", check="; ".join(checks))
 

@@ -32,6 +32,7 @@ _CHARACTERS: Final[Mapping[int, str]] = {
 }  # fmt: skip
 _CELL, _STRUCTURE, _CHAR = 1, 2, 4
 _MOST: Final = 100_000
+"""Most arrays of a file."""
 _DEEPEST: Final = 8
 """Most parts of a path behind the name of a variable."""
 _NUMERIC: Final[Mapping[int, str]] = {

@@ -28,11 +28,13 @@ BAG_SUFFIXES: Final = (".bag", ".mcap", ".db3")
 PARQUET_SUFFIXES: Final = (".parquet", ".pq")
 READ_SUFFIXES: Final = (*TEXT_SUFFIXES, *ARRAY_SUFFIXES, *BAG_SUFFIXES, *PARQUET_SUFFIXES)
 _NO_TABLES: Final = (".toml", ".json", ".pdf", ".xml", ".html", ".py", ".m")
+"""Endings of texts that are something else than a table."""
 _BEGINNING: Final = 4096
+"""Bytes in which a file shows whether it is a text."""
 
 
 def is_text(path: Path) -> bool:
-    """Return whether a file is read as a text: by its ending or, with one that says nothing, as it has no zero byte."""
+    """Return whether a file is read as a text: by its ending, or else because it has no zero byte."""
     if text_suffix(path) in TEXT_SUFFIXES:
         return True
     if text_suffix(path) in (*READ_SUFFIXES, *_NO_TABLES) or not path.is_file():
